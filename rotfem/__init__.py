@@ -18,36 +18,67 @@ from rotfem.registry import register
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
-    from rotfem.analysis.alpha_family import GeneralisedAlpha, Newmark
-    from rotfem.analysis.runge_kutta import ESDIRK4
-    from rotfem.analysis.schemes import Scheme, Stage, State
-    from rotfem.commands.campbell import campbell
-    from rotfem.commands.check import check
-    from rotfem.commands.cost.result import CostResult
-    from rotfem.commands.cost.study import cost
-    from rotfem.commands.explain import explain
-    from rotfem.commands.import_blade import import_blade
-    from rotfem.commands.modes import modes
-    from rotfem.commands.problem import Problem
-    from rotfem.commands.response import response
-    from rotfem.commands.run import run
-    from rotfem.commands.sweep import sweep
-    from rotfem.mechanics.effects import DampingModel, Effect
-    from rotfem.mechanics.free_hub import FreeHub, Torque
-    from rotfem.mechanics.loads import ConstantLoad, Loads
-    from rotfem.mechanics.motion import Motion, MotionLaw
-    from rotfem.mechanics.problem import Output
-    from rotfem.mechanics.theories import Theory
-    from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
-    from rotfem.results.compare import CompareResult, compare
-    from rotfem.results.sweep import SweepResult
-    from rotfem.scene import BeamMesh, PlateMesh, Scene, load_scene
+    from rotfem.analysis.alpha_family import GeneralisedAlpha as GeneralisedAlpha
+    from rotfem.analysis.alpha_family import Newmark as Newmark
+    from rotfem.analysis.runge_kutta import ESDIRK4 as ESDIRK4
+    from rotfem.analysis.schemes import Scheme as Scheme
+    from rotfem.analysis.schemes import Stage as Stage
+    from rotfem.analysis.schemes import State as State
+    from rotfem.commands.campbell import campbell as campbell
+    from rotfem.commands.check import check as check
+    from rotfem.commands.cost.result import CostResult as CostResult
+    from rotfem.commands.cost.study import cost as cost
+    from rotfem.commands.explain import explain as explain
+    from rotfem.commands.import_blade import import_blade as import_blade
+    from rotfem.commands.modes import modes as modes
+    from rotfem.commands.problem import Problem as Problem
+    from rotfem.commands.response import response as response
+    from rotfem.commands.run import run as run
+    from rotfem.commands.sweep import sweep as sweep
+    from rotfem.mechanics.effects import DampingModel as DampingModel
+    from rotfem.mechanics.effects import Effect as Effect
+    from rotfem.mechanics.free_hub import FreeHub as FreeHub
+    from rotfem.mechanics.free_hub import Torque as Torque
+    from rotfem.mechanics.loads import ConstantLoad as ConstantLoad
+    from rotfem.mechanics.loads import Loads as Loads
+    from rotfem.mechanics.motion import Motion as Motion
+    from rotfem.mechanics.motion import MotionLaw as MotionLaw
+    from rotfem.mechanics.problem import Output as Output
+    from rotfem.mechanics.theories import Theory as Theory
+    from rotfem.results import (
+        CampbellResult as CampbellResult,
+    )
+    from rotfem.results import (
+        CheckResult as CheckResult,
+    )
+    from rotfem.results import (
+        ExplainResult as ExplainResult,
+    )
+    from rotfem.results import (
+        ModesResult as ModesResult,
+    )
+    from rotfem.results import (
+        ResponseResult as ResponseResult,
+    )
+    from rotfem.results import (
+        RunResult as RunResult,
+    )
+    from rotfem.results.compare import CompareResult as CompareResult
+    from rotfem.results.compare import compare as compare
+    from rotfem.results.sweep import SweepResult as SweepResult
+    from rotfem.scene import BeamMesh as BeamMesh
+    from rotfem.scene import PlateMesh as PlateMesh
+    from rotfem.scene import Scene as Scene
+    from rotfem.scene import load_scene as load_scene
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
-    from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
+    from rotfem.scene.blades.deck import Asked as Asked
+    from rotfem.scene.blades.deck import BladeFormat as BladeFormat
+    from rotfem.scene.blades.deck import Deck as Deck
     from rotfem.scene.plates import PlateStructure as Plate
-    from rotfem.scene.section_shapes import Geometry, Shape
-    from rotfem.scene.structure import StructureKind
+    from rotfem.scene.section_shapes import Geometry as Geometry
+    from rotfem.scene.section_shapes import Shape as Shape
+    from rotfem.scene.structure import StructureKind as StructureKind
 
 #: Public name ↦ module and name there: what type checkers see above is imported when it is first asked for.
 _LATER = {
@@ -59,63 +90,8 @@ _LATER = {
     for alias in node.names
 }
 
-__all__ = [
-    "ESDIRK4",
-    "Asked",
-    "BeamMesh",
-    "BladeFormat",
-    "CampbellResult",
-    "CheckResult",
-    "CompareResult",
-    "ComputationError",
-    "ConstantLoad",
-    "CostResult",
-    "DampingModel",
-    "Deck",
-    "Effect",
-    "ExplainResult",
-    "FreeHub",
-    "GeneralisedAlpha",
-    "Geometry",
-    "InputError",
-    "Loads",
-    "ModesResult",
-    "Motion",
-    "MotionLaw",
-    "Newmark",
-    "Output",
-    "OutputError",
-    "PlanarBeam",
-    "Plate",
-    "PlateMesh",
-    "Problem",
-    "ResponseResult",
-    "RunResult",
-    "Scene",
-    "SceneError",
-    "Scheme",
-    "Shape",
-    "SpatialBeam",
-    "Stage",
-    "State",
-    "StructureKind",
-    "SweepResult",
-    "Theory",
-    "Torque",
-    "__version__",
-    "campbell",
-    "check",
-    "compare",
-    "cost",
-    "explain",
-    "import_blade",
-    "load_scene",
-    "modes",
-    "register",
-    "response",
-    "run",
-    "sweep",
-]
+__all__ = ["ComputationError", "InputError", "OutputError", "SceneError", "__version__", "register"]
+__all__ += sorted(_LATER)
 
 
 def __getattr__(name: str) -> Any:
