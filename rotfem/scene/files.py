@@ -6,9 +6,8 @@ import math
 import os
 import re
 import select
-import stat
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -19,7 +18,7 @@ from pydantic import ValidationInfo
 
 from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
-from rotfem.scene.values import Matrix, limits_in
+from rotfem.scene.values import Matrix, as_rows, limits_in
 
 #: What a pipe may keep one waiting (s) before it has anything to say.
 PATIENCE = 10.0
@@ -59,37 +58,24 @@ def read_bytes(path: Path, most: int) -> bytes:
         Unreadable: there is none, it is a directory, it has more than `most` bytes, or nothing comes out of a pipe.
     """
     note(path)
+    content = bytearray()
     try:
         # A pipe without a writer would block here.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+            if not select.select([file], [], [], PATIENCE)[0]:
+                raise Unreadable(f"nothing can be read from it: no byte came in {PATIENCE:g} s")
+            os.set_blocking(file.fileno(), True)
+            while len(content) <= most and (piece := file.read(1 << 20)):
+                content += piece
     except FileNotFoundError:
         raise Unreadable("no such file") from None
+    except IsADirectoryError:
+        raise Unreadable("is a directory; a scene is a TOML file") from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         raise Unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    try:
-        mode = os.fstat(descriptor).st_mode
-        if stat.S_ISDIR(mode):
-            raise Unreadable("is a directory; a scene is a TOML file")
-        return _all(descriptor, most, waits=not stat.S_ISREG(mode))
-    except OSError as error:
-        raise Unreadable(f"cannot be read: {error.strerror or error}") from None
-    finally:
-        os.close(descriptor)
-
-
-def _all(descriptor: int, most: int, waits: bool) -> bytes:
-    content = bytearray()
-    while len(content) <= most:
-        if waits and not select.select([descriptor], [], [], PATIENCE)[0]:
-            raise Unreadable(f"nothing can be read from it: no byte came in {PATIENCE:g} s")
-        try:
-            piece = os.read(descriptor, 1 << 20)
-        except BlockingIOError:
-            continue
-        if not piece:
-            return bytes(content)
-        content += piece
-    raise Unreadable(f"is larger than {most} bytes")
+    if len(content) > most:
+        raise Unreadable(f"is larger than {most} bytes")
+    return bytes(content)
 
 
 #: Bytes of a file that is no table, at most.
@@ -97,9 +83,6 @@ LARGEST = 50_000_000
 
 #: Tables and lists within each other, at most; the deepest that a scene has is six: rows with a matrix in a table.
 DEEPEST = 30
-
-#: Types of values that nothing is nested in.
-PLAIN = frozenset((bool, int, float, str))
 
 _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
@@ -164,34 +147,22 @@ def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, 
     return result
 
 
-def check_depth(file: str, data: Any) -> None:
-    """Refuse tables and lists that are nested deeper than a scene can be, with a SceneError that names their key."""
-    for key, value in data.items():
-        level, depth = [value], 0
-        while level := [entry for one in level for entry in _entries(one) if type(entry) not in PLAIN]:
-            depth += 1
-            if depth > DEEPEST:
-                raise SceneError(file, str(key), allowed=f"is nested more than {DEEPEST} deep")
-
-
-def _entries(value: Any) -> Iterable[Any]:
-    """Return what is in a table or list; nothing of anything else."""
-    if isinstance(value, list | tuple):
-        return value
-    return value.values() if isinstance(value, Mapping) else ()
-
-
 def encodable(text: str) -> str:
     """Return a text that UTF-8 can hold: what a command line gives in other bytes is shown as such."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
-def to_builtin(value: Any) -> Any:
-    """Return the value with NumPy arrays and numbers, at any depth, as lists and Python numbers."""
+def to_builtin(file: str, key: str, value: Any, depth: int = 0) -> Any:
+    """Return what stands at a key with NumPy arrays and numbers, at any depth, as lists and Python numbers.
+
+    Raise a SceneError of the file where tables and lists are nested deeper than a scene can be.
+    """
+    if depth > DEEPEST:
+        raise SceneError(file, key, allowed=f"is nested more than {DEEPEST} deep")
     if isinstance(value, Mapping):
-        return {encodable(str(key)): to_builtin(entry) for key, entry in value.items()}
+        return {encodable(str(name)): to_builtin(file, key, entry, depth + 1) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [to_builtin(entry) for entry in value]
+        return [to_builtin(file, key, entry, depth + 1) for entry in value]
     if isinstance(value, str):
         return encodable(value)
     if isinstance(value, np.ndarray):
@@ -230,21 +201,29 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     return path
 
 
-#: What makes a table of rows and refuses those that are none, as `as_increasing_rows` does.
-Reader: TypeAlias = Callable[..., Matrix]
+#: What refuses rows, as `check_increasing` does.
+Check: TypeAlias = Callable[[Matrix, Any, str, Callable[[int], str]], None]
 
 
-def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, read: Reader) -> Matrix:
-    """Return the rows of a table, or of the CSV file at a path, that a reader accepts; messages name the line there."""
-    limits = limits_in(info)
-    if not isinstance(value, str | Path):
-        if isinstance(value, list | tuple):
-            limits.check("rows", len(value), value=value)
-        return read(value, columns, shape)
-    path, text = table_text(value, info)
-    by_line = read_rows(text, path)
-    lines = tuple(by_line)
-    return read(tuple(by_line.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
+def as_table(
+    value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, check: Check | None = None
+) -> Matrix:
+    """Return the rows of a table, or of the CSV file at a path, if they pass a check; messages name the line there."""
+    name: Callable[[int], str] = "row {}".format
+    if isinstance(value, str | Path):
+        path, text = table_text(value, info)
+        by_line = read_rows(text, path)
+        lines, value = tuple(by_line), tuple(by_line.values())
+
+        def name(row: int) -> str:
+            return f"line {lines[row - 1]}"
+
+    elif isinstance(value, list | tuple):
+        limits_in(info).check("rows", len(value), value=value)
+    rows = as_rows(value, columns, shape, name)
+    if check is not None:
+        check(rows, value, shape, name)
+    return rows
 
 
 def table_text(value: Any, info: ValidationInfo) -> tuple[Path, str]:

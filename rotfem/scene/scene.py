@@ -18,7 +18,7 @@ from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, check_depth, noted_files, read_toml, set_key, to_builtin
+from rotfem.scene.files import apply_overrides, encodable, noted_files, read_toml, set_key, to_builtin
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
@@ -117,12 +117,11 @@ class Scene(SceneModel):
         Raises:
             SceneError: anything in it is not valid.
         """
-        check_depth(name, data)
-        return cls._validate(to_builtin(data), name, name, str(directory))
+        return cls._validate(data, name, name, str(directory))
 
     @classmethod
-    def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
-        check_depth(file, tables)
+    def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
+        tables = {encodable(str(key)): to_builtin(file, str(key), value) for key, value in data.items()}
         with noted_files() as extensions:
             load_wanted(tables, file, directory)
         given = tables.get("motion")
@@ -183,10 +182,9 @@ class Scene(SceneModel):
         Raises:
             SceneError: the result is not valid.
         """
-        check_depth(self._file, changes)
         tables = self._tables
         for key, value in changes.items():
-            tables = set_key(self._file, tables, key, to_builtin(value))
+            tables = set_key(self._file, tables, key, value)
         variant = type(self)._validate(tables, self._name, self._file, self._directory)
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
         return variant

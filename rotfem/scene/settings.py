@@ -22,7 +22,7 @@ from rotfem.scene.table import (
     problem,
     with_parameters,
 )
-from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
+from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, check_increasing
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
@@ -90,7 +90,7 @@ class Model(SceneModel):
 
 
 def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:
-    rows = as_table(value, info, (3, 4), "a table [[x, v1, v2, v3], …] (v3 may be left out)", as_increasing_rows)
+    rows = as_table(value, info, (3, 4), "a table [[x, v1, v2, v3], …] (v3 may be left out)", check_increasing)
     return tuple((*row, 0.0)[:4] for row in rows)
 
 

@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_table
 from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import Array, Matrix, Number, Positive, as_increasing_rows, as_padded_vector3, such
+from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3, check_increasing, such
 from rotfem.units import is_quantity
 
 
@@ -34,13 +34,13 @@ def function_of(what: str, count: int = 1) -> PlainValidator:
 def time_table(column: str) -> PlainValidator:
     """Return the validator of a table [[t, column], …], rows or the path of a CSV file."""
     return PlainValidator(
-        lambda value, info: as_table(value, info, (2,), f"a table [[t, {column}], …]", as_increasing_rows)
+        lambda value, info: as_table(value, info, (2,), f"a table [[t, {column}], …]", check_increasing)
     )
 
 
 def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
     """Return rows (t, a1, a2, a3), the last column zero where it is not given; raise on anything else."""
-    rows = as_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)", as_increasing_rows)
+    rows = as_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)", check_increasing)
     return tuple((*row, 0.0)[:4] for row in rows)
 
 

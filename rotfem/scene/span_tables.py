@@ -18,18 +18,17 @@ import numpy as np
 from pydantic import GetCoreSchemaHandler, PlainValidator, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
-from rotfem.scene.files import Reader, as_table, read_header, read_rows, table_text
+from rotfem.scene.files import Check, as_table, read_header, read_rows, table_text
 from rotfem.scene.signals import arguments
 from rotfem.scene.table import did_you_mean, problem, problems_at
 from rotfem.scene.values import (
     Bounds,
     Matrix,
     Profile,
-    as_increasing_rows,
     as_number,
-    as_rows,
     as_symmetric_matrix,
     as_vector,
+    check_increasing,
 )
 
 #: A table, or a function in its place.
@@ -68,7 +67,7 @@ class Kind:
             function: Callable[..., Any] = value
             return function
         shape = "a table " + " or ".join(f"[[{names}, {columns}], …]" for columns in self.columns)
-        table = as_table(value, info, [len(over) + size for size in self.sizes], shape, READERS[over])
+        table = as_table(value, info, [len(over) + size for size in self.sizes], shape, CHECKS[over])
         return tuple((*row[: len(over)], *self._filled(row[len(over) :])) for row in table)
 
     def _filled(self, vector: tuple[float, ...]) -> tuple[float, ...]:
@@ -80,11 +79,8 @@ MOMENT = Kind((1, 3), ("m", "m1, m2, m3"))
 PRESSURE = Kind((1,), ("p",))
 
 
-def span_rows(
-    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
-) -> Matrix:
-    """Return rows (x, …) with x (m) not decreasing, at least two; one x may stand in two of them: a jump."""
-    rows = as_rows(value, columns, shape, row_name)
+def check_span(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str]) -> None:
+    """Refuse rows (x, …) whose x (m) decreases, or does not change; one x may stand in two of them: a jump."""
     x = [row[0] for row in rows]
     if len(rows) < 2 or x[0] == x[-1]:
         raise problem("", value, f"must be {shape} with at least two rows at different x")
@@ -94,14 +90,10 @@ def span_rows(
     most = max(Counter(x).items(), key=lambda item: item[1])
     if most[1] > 2:
         raise problem("", value, f"x = {most[0]:g} stands in {most[1]} rows; must be in one, or in two, where it jumps")
-    return rows
 
 
-def grid_rows(
-    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
-) -> Matrix:
-    """Return rows (x, t, …), sorted, in which every x (m), at least two, stands with every t (s), at least two."""
-    rows = as_rows(value, columns, shape, row_name)
+def check_grid(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str]) -> None:
+    """Refuse rows (x, t, …) unless every x (m), at least two, stands with every t (s), at least two."""
     found: dict[tuple[float, float], int] = {}
     for i, (x, t, *_) in enumerate(rows, start=1):
         if (x, t) in found:
@@ -113,11 +105,10 @@ def grid_rows(
     missing = next(((x, t) for x in stations for t in times if (x, t) not in found), None)
     if missing is not None:
         raise problem("", value, f"has no row for x = {missing[0]:g}, t = {missing[1]:g}; must have every t at every x")
-    return tuple(sorted(rows))
 
 
-#: What a table is over ↦ what reads its rows.
-READERS: dict[tuple[str, ...], Reader] = {("t",): as_increasing_rows, ("x",): span_rows, ("x", "t"): grid_rows}
+#: What a table is over ↦ what checks its rows.
+CHECKS: dict[tuple[str, ...], Check] = {("t",): check_increasing, ("x",): check_span, ("x", "t"): check_grid}
 
 
 # --- of points and matrices of a section ------------------------------------------------------------------------------
@@ -207,7 +198,7 @@ class FromFile:
 
     def __call__(self, value: Any, info: ValidationInfo) -> Any:
         """Return the rows of the file that a value names; else the value."""
-        return as_table(value, info, self.columns, self.shape, as_rows) if is_path(value) else value
+        return as_table(value, info, self.columns, self.shape) if is_path(value) else value
 
 
 OF_FILE = FromFile((2,), "a table [[x, value], …]")

@@ -6,10 +6,10 @@ become tuples, so that a validated scene cannot be changed by accident.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
@@ -99,7 +99,10 @@ class Bounds:
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise problem("", value, f"must be {f'a number {self}'.rstrip()}, or a taper [[x, value], …]")
             return self.number(value)
-        taper = as_taper(value)
+        shape = "a taper [[x, value], …]"
+        rows = as_rows(value, (2,), shape)
+        check_increasing(rows, value, shape)
+        taper = tuple((x, number) for x, number in rows)
         if taper[0][0] != 0.0 and not anywhere:
             raise problem("", value, f"the taper must start at x = 0, not at {taper[0][0]:g}")
         for x, number in taper:
@@ -179,7 +182,7 @@ def as_rows(value: Any, columns: Sequence[int], shape: str, row_name: Callable[[
 
 def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
     """Return a table of good numbers as a tuple of rows; None where every entry has to be checked."""
-    if set(map(len, value)) != {len(value[0])} or not set(map(type, itertools.chain(*value))) <= {int, float}:
+    if set(map(len, value)) != {len(value[0])} or not set(map(type, chain(*value))) <= {int, float}:
         return None
     try:
         table = np.array(value, dtype=np.float64)
@@ -190,25 +193,14 @@ def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
     return tuple(tuple(row) for row in rows) if good else None
 
 
-def as_increasing_rows(
-    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
-) -> Matrix:
-    """Return `as_rows`, at least two of them with a strictly increasing first column; raise on anything else."""
-    rows = as_rows(value, columns, shape, row_name)
+def check_increasing(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str] = "row {}".format) -> None:
+    """Refuse fewer than two rows, and a first column that does not increase strictly."""
     if len(rows) < 2:
         raise problem("", value, f"must be {shape} with at least two rows")
-    first = np.fromiter((row[0] for row in rows), dtype=np.float64, count=len(rows))
-    bad = np.flatnonzero(first[1:] <= first[:-1])
-    if len(bad):
-        i = int(bad[0])
-        reason = f"{row_name(i + 2)}: {first[i + 1]:g} ≤ {first[i]:g}"
-        raise problem("", value, f"the first column must increase strictly; {reason}")
-    return rows
-
-
-def as_taper(value: Any) -> Taper:
-    """Return a taper ((x, value), …) with x (m) strictly increasing; raise on anything else."""
-    return tuple((x, number) for x, number in as_increasing_rows(value, (2,), "a taper [[x, value], …]"))
+    for i, (before, after) in enumerate(pairwise(row[0] for row in rows), start=2):
+        if after <= before:
+            reason = f"{row_name(i)}: {after:g} ≤ {before:g}"
+            raise problem("", value, f"the first column must increase strictly; {reason}")
 
 
 def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:

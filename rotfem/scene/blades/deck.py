@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
@@ -71,31 +72,32 @@ class Deck:
         """Refuse the value of the line `value  name …`."""
         self.fail(reason, self.named(name)[0], 1)
 
-    def find(self, words: str, start: int = 1) -> int:
-        """Return the number of the first line, not before start, in which all words stand, whatever their case."""
+    def find(self, words: str) -> int:
+        """Return the number of the first line in which all words stand, whatever their case."""
         wanted = words.lower().split()
-        for number, line in enumerate(self.lines[start - 1 :], start=start):
-            low = line.lower()
-            if all(word in low for word in wanted):
+        for number, line in enumerate(self.lines, start=1):
+            if all(word in line.lower() for word in wanted):
                 return number
-        self.fail(f'no line with "{words}" from line {start} on')
+        self.fail(f'no line with "{words}"')
 
-    def named(self, name: str, start: int = 1) -> tuple[int, str]:
-        """Return (line, value) of the line `value  name …`, as input files of NREL's programs have them."""
-        if (found := self._named(name, start)) is None:
-            self.fail(f"no line with a value of {name} from line {start} on")
-        return found
+    @cached_property
+    def _named(self) -> dict[str, tuple[int, str]]:
+        """Name ↦ (line, value) of the first line `value  name …`, as input files of NREL's programs have them."""
+        out: dict[str, tuple[int, str]] = {}
+        for number, line in enumerate(self.lines, start=1):
+            if words := re.match(r"""\s*("[^"]*"|'[^']*'|\S+)\s+(\S+)""", line):
+                out.setdefault(words[2].rstrip(":-,").lower(), (number, words[1].strip("\"'")))
+        return out
 
     def has(self, name: str) -> bool:
         """Return whether there is a line `value  name …`."""
-        return self._named(name, 1) is not None
+        return name.lower() in self._named
 
-    def _named(self, name: str, start: int) -> tuple[int, str] | None:
-        for number, line in enumerate(self.lines[start - 1 :], start=start):
-            words = re.match(r"""\s*("[^"]*"|'[^']*'|\S+)\s+(\S+)""", line)
-            if words and words[2].rstrip(":-,").lower() == name.lower():
-                return number, words[1].strip("\"'")
-        return None
+    def named(self, name: str) -> tuple[int, str]:
+        """Return (line, value) of the line `value  name …`."""
+        if not self.has(name):
+            self.fail(f"no line with a value of {name}")
+        return self._named[name.lower()]
 
     def file(self, name: str) -> Deck:
         """Return the file that the line `value  name …` names, beside this one."""
@@ -104,14 +106,14 @@ class Deck:
             self.fail(f"there is no file {show(value)} beside it", line)
         return Deck(path)
 
-    def number(self, name: str, start: int = 1) -> float:
+    def number(self, name: str) -> float:
         """Return the number of the line `value  name …`."""
-        line, text = self.named(name, start)
+        line, text = self.named(name)
         return self.value(text, line, 1)
 
-    def count(self, name: str, least: int, start: int = 1) -> int:
+    def count(self, name: str, least: int) -> int:
         """Return the whole number of the line `value  name …`, at least so many."""
-        line, text = self.named(name, start)
+        line, text = self.named(name)
         if not text.isdecimal() or int(text) < least:
             self.fail(f'{name} is "{text[:SHOWN_CELL]}"; must be a whole number, at least {least}', line, 1)
         return int(text)
