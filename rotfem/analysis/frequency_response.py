@@ -119,8 +119,8 @@ class FrequencyResponse:
             frequencies: rad/s.
             count: modes taken; what all others answer statically is added.
         """
-        pairs = self.spinning.pairs.select(np.arange(min(count, len(self.spinning.pairs.values))))
-        n = np.diag(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+        first = self.spinning.first(count)
+        pairs, n = first.pairs, np.diag(first.own)
         seen = np.array([self._read(x, s) for x, s in zip(pairs.right.T, pairs.values, strict=True)]).T
         gains = self._summed(pairs.left.conj().T @ self.force) / n
         others = self._summed(pairs.left.T @ self.force) / n.conj()  # of the conjugate pairs

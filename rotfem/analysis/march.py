@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -50,20 +52,15 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
     Raises:
         ComputationError: a step failed, however short.
     """
-    reached, time_grid = (
-        state.t,
-        TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > 2),
-    )
-    legs = (leg for leg in time_grid if leg.end > reached)
-    leg = next(legs, None)
-    if leg is not None and reached == 0.0:
-        state = started(stepper, state, leg)
-    while leg is not None:
-        after = next(legs, None)
+    times = TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > 2)
+    reached = state.t
+    for leg, after in pairwise(chain((leg for leg in times if leg.end > reached), [None])):
+        assert leg is not None
+        if state.t == 0.0:
+            state = started(stepper, state, leg)
         state = travel(stepper, state, leg, after)
         if leg.whole:
             yield state
-        leg = after
 
 
 def grid(steps: Steps) -> tuple[Array, float]:
@@ -85,10 +82,7 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         ComputationError: the step failed, however short.
     """
     old = state
-    if leg.lands or leg.line:
-        with seen(stepper.system, leg.finish):
-            state = stepper.advance(old, leg.length, leg.end)
-    else:
+    with seen(stepper.system, leg.finish) if leg.lands or leg.line else nullcontext():
         state = stepper.advance(old, leg.length, leg.end)
     for observe in stepper.observers:
         observe(old, state, leg)

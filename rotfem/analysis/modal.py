@@ -259,23 +259,20 @@ class ModalAnalysis:
         for vectors in (pairs.right, pairs.left):
             vectors[self.system.held.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
-        factored = pencil.factored
-        spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}
+        spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": pencil.factored, "eigen": t3 - t2}
         for name, span in spans.items():
             self.seconds[name] += span
+        self.seconds["eigen"] -= pencil.factored
         if not self.free:
             self.system.analysed = pencil.factor
         if keep:
             pencil.factor = None
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
-        finite, reference = massed(clamped.M), self.system.reference
-        if not self.free:
-            chosen = pairs.select(np.arange(len(pairs.values))[:finite])
-            return Spinning(speed, q, pencil, chosen, clamped, reference=reference)
-        flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
-        rigid = len(flexible) < len(pairs.values)
-        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid, reference)
+        sizes = np.abs(pairs.values)
+        flexible = np.flatnonzero(sizes > ZERO * np.median(sizes)) if self.free else np.arange(len(sizes))
+        chosen = pairs.select(flexible[: massed(clamped.M)])
+        return Spinning(speed, q, pencil, chosen, clamped, len(flexible) < len(sizes), self.system.reference)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.

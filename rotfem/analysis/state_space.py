@@ -77,10 +77,10 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
         SceneError: the analysis is distributed over several processes.
     """
     serial(analysis, "the state-space model")
-    structure, pencil = analysis.structure, spinning.pencil
-    pairs = spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values))))
+    structure = analysis.structure
+    spinning = spinning.first(count)
+    pairs, n = spinning.pairs, np.diag(spinning.own)
     tip = np.arange(structure.tip_values.dofs.start, structure.tip_values.dofs.stop)
-    n = np.diag(pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
     blocks, rows, columns = [], [], []
     for j, lam in enumerate(pairs.values):
         gain, shape = pairs.left[tip, j].conj() / n[j], pairs.right[tip, j]
