@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rotfem.analysis.load_steps import Growth, balance, recounted
+from rotfem.analysis.load_steps import Growth, balance, check_inside_out, recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
 from rotfem.numerics.newton import Newton
@@ -144,8 +144,7 @@ class Tracer:
                 raise ComputationError("the corrections of a step along the path diverged")
             if size <= self.newton.tolerance:
                 self._set(q, s)
-                if self.system.model.inside_out():
-                    raise ComputationError("the path met a state that is turned inside out")
+                check_inside_out(self.system)
                 self.system.structure.check_range(q)
                 self.system.check_reach(q)
                 return self._point(q, s, point), iteration

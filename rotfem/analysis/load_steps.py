@@ -44,12 +44,6 @@ def recounted(system: Any, q: Array, change: Array | None = None) -> tuple[Array
     return q, rate
 
 
-def reached(system: Any, q: Array) -> float:
-    """Return the part of their range that the rotations of q (local dof array) take; 0 where they have no limit."""
-    turns = system.structure.turns
-    return 0.0 if turns is None else float(turns.reached(q))
-
-
 @dataclass
 class Raised:
     """Where a growing load has led.
@@ -133,7 +127,8 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
             wandered = newton.wandered
             new = counted(system, growth, target, new, newton)
         except BeyondReach as error:
-            failure, afresh = error.what, reached(system, q) > 0.3
+            turns = system.structure.turns
+            failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
         except ComputationError as error:
             failure, afresh = error.what, False
         else:

@@ -129,16 +129,8 @@ class Stepper:
 
     def start(self, t: float, q: Array, v: Array) -> State:
         """Return the state at t (s) with the acceleration that the equations of motion give."""
-        s = self.system
-        state = State(t, q.copy(), v.copy(), np.zeros_like(q), reference=s.reference)
-        with seen(s, View(1)):
-            s.prescribe(t, state.q, state.v, state.a)
-            s.set_time(t)
-            s.set_state(state.q, state.v, state.a)
-            state.jump = np.asarray(s.acceleration())
-            state.a += state.jump
-            state.given = s.given(state)
-        return self.scheme.start(state)
+        state = State(t, q, v, np.zeros_like(q), reference=self.system.reference)
+        return self.scheme.start(self._accelerated(state, View(1)))
 
     def restart(self, state: State, before: View, after: View) -> State:
         """Return a state with the accelerations that hold after a jump of what drives the system.
@@ -156,7 +148,8 @@ class Stepper:
             same = np.allclose(s.driven(t), old, rtol=1e-7, atol=0.0)
         if s.comm.allreduce(same, MPI.LAND):  # what moves a clamp is on the processes that hold it
             return self.scheme.kinked(state)
-        return self._accelerated(state, after)
+        new = self._accelerated(state, after)
+        return self.scheme.jumped(new, new.a - state.a)
 
     def _accelerated(self, state: State, view: View) -> State:
         """Return a state with the accelerations that its equations of motion give, seen by a view."""
@@ -172,7 +165,7 @@ class Stepper:
             new.given = s.given(new)
         if new.given is not None and state.given is not None:
             new.given[:2] = state.given[:2]
-        return self.scheme.jumped(new, new.a - state.a)
+        return new
 
     def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h.
@@ -241,7 +234,10 @@ class Stepper:
         if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
             return stood
         if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
-            raise _cut_down(failure, h) if halvings == 0 else failure
+            if halvings > 0:
+                raise failure
+            advice = 'a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then'
+            raise ComputationError(f"{failure.what} (the step was cut down to {h:.3g} s)", failure.time, advice)
         self.substeps += 1
         middle = self.advance(state, h / 2, None, halvings - 1)
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
@@ -458,15 +454,6 @@ class Stepper:
                 break
             previous = d
         raise ComputationError("the old factor is too far from the matrix")
-
-
-def _cut_down(error: ComputationError, h: float) -> ComputationError:
-    """Return the error of a step that failed however short, with its length (s)."""
-    return ComputationError(
-        f"{error.what} (the step was cut down to {h:.3g} s)",
-        time=error.time,
-        advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
-    )
 
 
 def check_root(system: Any, stage: Stage, state: State) -> None:
