@@ -168,11 +168,11 @@ def assign(node: Node, following: Node) -> float:
 
 def swapped(a: Node, b: Node, count: int) -> bool:
     """Return whether one of the first branches changes its order by frequency with another between two nodes."""
-    both = [i for i in range(len(a.order)) if a.order[i] >= 0 and b.order[i] >= 0]
-    wa, wb = (np.array([n.value(i).imag for i in both]) for n in (a, b))
+    both = np.flatnonzero((a.order >= 0) & (b.order >= 0))
+    wa, wb = (n.spinning.pairs.values[n.order[both]].imag for n in (a, b))
     da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
     level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
-    asked = np.array(both) < count
+    asked = both < count
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 

@@ -346,11 +346,6 @@ class Described:
         return self._analysis.right(self._spinning)
 
     @cached_property
-    def _shapes(self) -> list[tuple[dict[str, Array], Array]]:
-        """Coordinates of the nodes, m, and complex components (n, components) of every mode, on every rank."""
-        return [self._structure.nodes(x) for x in self._right.T]
-
-    @cached_property
     def _energies(self) -> Array:
         """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
         names, X, MX = self._structure.unknowns, self._right, self._analysis.mass_times(self._spinning)
@@ -380,8 +375,8 @@ class Described:
         """
         axis = np.asarray(self._analysis.system.motion.axis) * (-1.0 if self._spinning.speed < 0.0 else 1.0)
         found = []
-        for shape in self._shapes:
-            wave = self._structure.wave(*shape, axis)
+        for x in self._right.T:
+            wave = self._structure.wave(*self._structure.nodes(x), axis)
             if wave is None:
                 return []
             found.append(wave if self._analysis.fixed is None else replace(wave, fixed=True))
@@ -394,9 +389,9 @@ class Described:
         Of a rotor the direction follows: "bending 1 backward".
         """
         families, out = [name for name in self.shares if name != "hub"], []
-        for j, shape in enumerate(self._shapes):
+        for j, x in enumerate(self._right.T):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            kind, number = self._structure.mode_name(first, *shape)
+            kind, number = self._structure.mode_name(first, *self._structure.nodes(x))
             mixed = others and self.shares[first][j] < 0.8
             out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
         pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed

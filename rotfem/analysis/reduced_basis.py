@@ -88,7 +88,7 @@ class SmallPencil(Pencil):
         upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
         order = upper[np.argsort(np.abs(values[upper]), kind="stable")[:count]]
         values, x, y = values[order], x[:, order], y[:, order]
-        MX, CX, KX = (product(A, x) for A in (self.M, self.C, self.K))
+        MX, CX, KX = np.split(product(np.vstack([self.M, self.C, self.K]), x), 3)
         n = np.sum(y.conj() * (2 * values * MX + CX), axis=0)
         residual = values**2 * MX + values * CX + KX
         sizes = np.sqrt(np.abs(np.diag(self.K)))
@@ -103,9 +103,10 @@ class SmallPencil(Pencil):
         except np.linalg.LinAlgError:
             return None
         H, n = self._root @ inverse.T, len(inverse)
-        S = np.block([[-inverse @ self.C @ inverse.T, -H.T], [H, np.zeros((len(H), len(H)))]])
+        S = np.zeros((n + len(H),) * 2, dtype=complex)  # i times the skew matrix, whose lower triangle is read
+        S.imag[:n, :n], S.imag[n:, :n] = inverse @ self.C @ inverse.T, -H
         last = min(count, len(H)) - 1
-        m, z = eigh(-1j * S, subset_by_index=[0, last], driver="evr", check_finite=False)
+        m, z = eigh(S, subset_by_index=[0, last], driver="evr", overwrite_a=True, check_finite=False)
         x = inverse.T @ z[:n]
         x = x / norm(x, axis=0)
         return -1j / m, x, x
@@ -215,12 +216,13 @@ class ReducedAnalysis(ModalAnalysis):
         pencil = SmallPencil(small["M"], small["C"], small["K"], self._root, self._asymmetries)
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
-        slope = pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values).diagonal()
+        pencil.owner = self
+        out = Spinning(speed, zero, pencil, pairs, pencil)
         X = product(self.V, pairs.right)
         lost = self._round_off.stiffness(X if pairs.left is pairs.right else product(self.V, pairs.left), X)
+        slope = out.own.diagonal()
         pairs.bounds = relative(lost / np.maximum(np.abs(slope * pairs.values), 1e-300)) + pairs.bounds
-        pencil.owner = self
-        return Spinning(speed, zero, pencil, pairs, pencil)
+        return out
 
     def right(self, spinning: Spinning) -> Array:
         """Return the eigenvectors in the unknowns of the mesh."""

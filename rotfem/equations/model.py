@@ -80,6 +80,7 @@ class Model:
         acting: the effects that have a term, by its name.
         switches: name ↦ constant factor.
         terms: name ↦ virtual work, a UFL form.
+        residual: their sum F(q, v, a; δq), a UFL form.
         compositions: how often they were written.
         time: that constants are set to, s.
         shown: the same, how signals are seen, and effects left out; None of another motion than the problem's.
@@ -108,6 +109,7 @@ class Model:
         """Write the mechanics and the terms, or write them anew where the structure counts its rotations otherwise."""
         self.mechanics: Mechanics = self._mechanics()
         self.terms = self.work(Variation(self.structure.k))
+        self.residual = added(self.terms.values())
         self._stretch: Any = None
 
     def at_rest(self, form: Any, undeformed: bool = False) -> dict[str, Any]:
@@ -195,11 +197,6 @@ class Model:
             if not isinstance(term, int):
                 out[name] = self._switched(name, name in self.effects, term)
         return out
-
-    @property
-    def residual(self) -> Any:
-        """F(q, v, a; δq), a UFL form."""
-        return added(self.terms.values())
 
     def derived_forms(self, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
         """Return forms that follow from the residual and their purpose alone; once made, they serve other meshes too.

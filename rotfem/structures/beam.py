@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from basix.ufl import element
 from dolfinx import fem, mesh
@@ -162,8 +164,12 @@ class Beam(Structure):
     def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
         """Return ({"x": (n,) m, increasing}, q (n, components)) at all nodes, on every rank."""
         x, q = self.gather(values)
-        order = np.argsort(x[:, 0])
-        return {"x": x[order, 0]}, q[order]
+        return {"x": x[self._order, 0]}, q[self._order]
+
+    @cached_property
+    def _order(self) -> npt.NDArray[np.int64]:
+        """Numbers of the nodes in their order along the beam."""
+        return np.argsort(self._points[:, 0])
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
         """Return the family of a mode shape (n, components) and its number: one more than its nodes."""

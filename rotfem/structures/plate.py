@@ -355,12 +355,11 @@ class Plate(Structure):
     def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
         """Return ({"x", "y": (n,) m, sorted by x, then y}, q (n, components)) at all nodes, on every rank."""
         x, q = self.gather(values)
-        _, order = self._order
-        return {"x": x[order, 0], "y": x[order, 1]}, q[order]
+        return {"x": x[self._order, 0], "y": x[self._order, 1]}, q[self._order]
 
     def ordered(self, values: Array) -> Array:
         """Return values at the nodes of this process (owned, …) as those of all in the order of `nodes`."""
-        return np.asarray(np.concatenate(self.comm.allgather(values))[self._order[1]])
+        return np.asarray(np.concatenate(self.comm.allgather(values))[self._order])
 
     def surface(self) -> npt.NDArray[np.int64]:
         """Return triangles between the nodes in the order of `nodes`, shape (m, 3), on every rank."""
@@ -371,16 +370,14 @@ class Plate(Structure):
         # The nodes that `gather` returns are in the order of their global numbers.
         triangles: npt.NDArray[np.int64] = np.concatenate(self.comm.allgather(here))
         place = np.empty(dofmap.index_map.size_global, dtype=np.int64)
-        place[self._order[1]] = np.arange(len(place))
+        place[self._order] = np.arange(len(place))
         return place[triangles]
 
     @cached_property
-    def _order(self) -> tuple[Array, npt.NDArray[np.int64]]:
-        """Return (x, order): all nodes, and the permutation that sorts them by x, then y."""
-        owned = self.V.dofmap.index_map.size_local
-        x = np.concatenate(self.comm.allgather(self.V.tabulate_dof_coordinates()[:owned]))
-        cell = 1e-7 * self.length  # closer nodes share a coordinate
-        return x, np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell)))
+    def _order(self) -> npt.NDArray[np.int64]:
+        """The permutation that sorts all nodes by x, then y."""
+        x, cell = self._points, 1e-7 * self.length  # closer nodes share a coordinate
+        return np.asarray(np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell))))
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
         """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -334,11 +335,14 @@ class Structure:
     def gather(self, values: Array) -> tuple[Array, Array]:
         """Return positions (n, 3) in m and values (n, components) of a local dof array at all nodes, on every rank."""
         owned = self.V.dofmap.index_map.size_local
-        x = self.V.tabulate_dof_coordinates()[:owned]
         q = self.whole_values(values[: self.size * owned].reshape(-1, self.size))
-        if self.comm.size == 1:
-            return x, q
-        return np.concatenate(self.comm.allgather(x)), np.concatenate(self.comm.allgather(q))
+        return self._points, q if self.comm.size == 1 else np.concatenate(self.comm.allgather(q))
+
+    @cached_property
+    def _points(self) -> Array:
+        """Positions of all nodes, (n, 3) in m, on every rank."""
+        x: Array = self.V.tabulate_dof_coordinates()[: self.V.dofmap.index_map.size_local]
+        return x if self.comm.size == 1 else np.concatenate(self.comm.allgather(x))
 
     def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
         """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
