@@ -25,29 +25,29 @@ def loads_of(scene: Scene, motion: Motion) -> Loads:
     points = []
     for i, point in enumerate(given.at):
         made = {
-            name: load_of(f"at.{i}.{name}", load, structure, motion, point.kind_of(load))
+            name: load_of(f"loads.at.{i}.{name}", load, structure, motion, point.kind_of(load))
             for name, load in (("force", point.force), ("moment", point.moment))
             if load is not None
         }
         points.append(PointLoads(point.x, **made))
     whole: dict[str, Any] = {name: load for name in WHOLE if (load := getattr(given, name)) is not None}
-    made = {name: load_of(name, load, structure, motion, load.kind) for name, load in whole.items()}
+    made = {name: load_of(f"loads.{name}", load, structure, motion, load.kind) for name, load in whole.items()}
     return Loads(gravity=given.gravity, at=tuple(points), **made)
 
 
-def load_of(name: str, given: Any, structure: Any, motion: Motion, kind: str) -> AnyLoad:
-    """Return one load.
+def load_of(key: str, given: Any, structure: Any, motion: Motion | None = None, kind: str = "dead") -> AnyLoad:
+    """Return one load, or another signal.
 
     Args:
-        name: key in [loads].
+        key: of the scene.
         given: what the scene has there.
         structure: of the scene.
-        motion: of the hub.
+        motion: of the hub, which harmonics of its angle need.
         kind: "dead" or "follower".
     """
-    key, planar = f"loads.{name}", structure.is_planar
-    size = 1 if name == "pressure" or (planar and name.endswith("moment")) else 3
-    if (place := given.place_function) is not None:
+    planar = structure.is_planar
+    size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
+    if (place := getattr(given, "place_function", None)) is not None:
         timed = given.over_span_and_time is not None
         function = checked(place, key, size, "place and time" if timed else "place", planar)
         at = function if timed else (lambda x, t: function(x))
@@ -55,7 +55,7 @@ def load_of(name: str, given: Any, structure: Any, motion: Motion, kind: str) ->
         probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
         places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
         return PlaceLoad(kind, at, places, constant=not timed)
-    terms = [_harmonic(harmonic, motion) for harmonic in given.harmonic]
+    terms = [_harmonic(harmonic, motion) for harmonic in getattr(given, "harmonic", ())]
     if given.value is not None:
         terms.append(Term(Shapes.uniform([given.value])))
     elif given.time_function is not None:
@@ -73,7 +73,7 @@ def load_of(name: str, given: Any, structure: Any, motion: Motion, kind: str) ->
     return Load(kind, tuple(terms))
 
 
-def _harmonic(harmonic: Any, motion: Motion) -> Term:
+def _harmonic(harmonic: Any, motion: Any) -> Term:
     amplitude, per_rev = harmonic.amplitude, harmonic.per_rev
     shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
     if per_rev is None:

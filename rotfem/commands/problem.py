@@ -15,7 +15,7 @@ from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.commands.loads import loads_of
+from rotfem.commands.loads import load_of, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
 from rotfem.equations.compiled import compile_system
@@ -31,7 +31,7 @@ from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.scene.settings import estimates_error, usual
 from rotfem.units import si
-from rotfem.users_functions import checked, number_of
+from rotfem.users_functions import number_of
 
 
 class Problem(ProblemData):
@@ -201,11 +201,12 @@ def scheme_of(time: Time) -> Scheme:
 def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
-    base = m.base_acceleration
+    given = m.base_acceleration
+    base = None if given is None else load_of("motion.base_acceleration", given, scene.structure)
     more = {
-        "base_acceleration": no_acceleration if base is None else _base_acceleration(base),
+        "base_acceleration": no_acceleration if base is None else base.at,
         "is_accelerated": base is not None and not base.is_zero,
-        "base_knots": None if base is None else base.knots,
+        "base_knots": base.knots if base is not None and base.linear else None,
     }
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
@@ -213,12 +214,6 @@ def motion_of(scene: Scene) -> Motion:
     if base is not None and not base.constant:
         motion = replace(motion, constant=False)
     return with_pitch(scene, motion) if scene.structure.pitches else motion
-
-
-def _base_acceleration(base: Any) -> Any:
-    if base.function is None:
-        return base.at
-    return checked(base.function, "motion.base_acceleration", 3, "time")
 
 
 def _by_law(m: Any, more: dict[str, Any]) -> Motion:

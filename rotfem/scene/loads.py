@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotfem.scene.motion import Motion
-from rotfem.scene.signals import Given, Harmonic, TimeFunction, arguments
-from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over, is_path
+from rotfem.scene.signals import FORCE, MOMENT, PRESSURE, Harmonic, Kind, Signal, arguments
+from rotfem.scene.span_tables import is_path
 from rotfem.scene.table import SceneModel, Unit, problem
 from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, as_number, as_vector
 
@@ -18,12 +19,7 @@ from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, as_numb
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
-#: Key of a table ↦ what its rows are over, and the units of that.
-OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
-OVER_UNITS = {"t": "s", "x": "m"}
-
-
-class Load(Given):
+class Load(Signal):
     """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
 
     Attributes:
@@ -37,24 +33,10 @@ class Load(Given):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")
     VECTORS: ClassVar[Kind] = FORCE
-    UNIT: ClassVar[str] = "N"
 
-    value: tuple[float, ...] | None = None
-    table: Matrix | None = None
-    function: TimeFunction | None = None
     kind: Literal["dead", "follower"] = "dead"
     over_time: Any = None
     harmonic: tuple[Harmonic, ...] = ()
-
-    @field_validator("value", mode="plain")
-    @classmethod
-    def _read_value(cls, value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-        return None if value is None else cls._vector(value, info)
-
-    @field_validator(*OVER, mode="plain", check_fields=False)
-    @classmethod
-    def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls._rows(OVER[str(info.field_name)], value, info)
 
     @field_validator("harmonic", mode="after")
     @classmethod
@@ -69,20 +51,7 @@ class Load(Given):
 
     @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        return cls._vector(value, info)
-
-    @classmethod
-    def _vector(cls, value: Any, info: ValidationInfo) -> tuple[float, ...]:
-        return cls.VECTORS.vector(Unit(cls._unit(info)).read(value))
-
-    @classmethod
-    def _rows(cls, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
-        units = Unit(cls._unit(info), tuple(OVER_UNITS[name] for name in over))
-        return cls.VECTORS.rows(over, units.read(value), info)
-
-    @classmethod
-    def _unit(cls, info: ValidationInfo) -> str:
-        return cls.UNIT
+        return cls._kind(info).vector(value)
 
     @property
     def time_table(self) -> Matrix | None:
@@ -107,8 +76,8 @@ class Load(Given):
     @property
     def vectors(self) -> Iterator[tuple[float, ...]]:
         """All vectors that are known of it: of the value, of tables and of harmonics."""
-        yield from () if self.value is None else (self.value,)
-        yield from (row[1:] for row in (*(self.time_table or ()), *self.span_rows))
+        yield from super().vectors
+        yield from (row[1:] for row in self.span_rows)
         yield from (h.amplitude for h in self.harmonic if not isinstance(h.amplitude[0], tuple))
 
 
@@ -116,7 +85,6 @@ class MomentLoad(Load):
     """A moment over time (N·m): one component, about axis 3, for a planar beam and three for a spatial one."""
 
     VECTORS: ClassVar[Kind] = MOMENT
-    UNIT: ClassVar[str] = "N*m"
 
 
 class SpanLoad(Load):
@@ -130,20 +98,21 @@ class SpanLoad(Load):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "over_span", "over_time", "over_span_and_time", "table", "function")
 
-    UNIT: ClassVar[str] = "N/m"
+    VECTORS: ClassVar[Kind] = replace(FORCE, unit="N/m")
 
     over_span: Any = None
     over_span_and_time: Any = None
 
     @classmethod
-    def _unit(cls, info: ValidationInfo) -> str:
-        on_plate = cls.UNIT == "N/m" and (info.context or {}).get("type") == "plate"
-        return "N/m**2" if on_plate else cls.UNIT
+    def _kind(cls, info: ValidationInfo) -> Kind:
+        on_plate = cls is SpanLoad and (info.context or {}).get("type") == "plate"
+        return replace(FORCE, unit="N/m**2") if on_plate else cls.VECTORS
 
     @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
         rows = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
-        return cls._rows(("x",), value, info) if rows or is_path(value) else cls._vector(value, info)
+        kind = cls._kind(info)
+        return kind.rows(("x",), value, info) if rows or is_path(value) else kind.vector(value)
 
     @property
     def place_function(self) -> Callable[..., Any] | None:
@@ -179,8 +148,7 @@ class SpanLoad(Load):
 class SpanMoment(SpanLoad):
     """A moment per length of a beam (N): one component, about axis 3, for a planar beam and three for a spatial one."""
 
-    VECTORS: ClassVar[Kind] = MOMENT
-    UNIT: ClassVar[str] = "N"
+    VECTORS: ClassVar[Kind] = replace(MOMENT, unit="N")
 
 
 class Pressure(SpanLoad):
@@ -192,7 +160,6 @@ class Pressure(SpanLoad):
 
     WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
     VECTORS: ClassVar[Kind] = PRESSURE
-    UNIT: ClassVar[str] = "Pa"
 
     regions: dict[str, Annotated[Number, Unit("Pa")]] | None = None
 
@@ -271,7 +238,7 @@ def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load in loads.named.items():
         key = f"loads.{name}"
-        if load.VECTORS is MOMENT:
+        if load.VECTORS.sizes == MOMENT.sizes:
             _check_moment(key, structure, load)
         for x, *_ in load.span_rows:
             if structure.length is not None and not -ROUND_OFF <= x / structure.length <= 1 + ROUND_OFF:

@@ -22,7 +22,6 @@ from rotfem.scene.files import apply_overrides, encodable, noted_files, read_tom
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
-from rotfem.scene.span_tables import FORCE
 from rotfem.scene.structure import designed
 from rotfem.scene.table import SceneModel, Unit, problem, scene_error
 from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
@@ -333,7 +332,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS is FORCE}
+    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS.padded}
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
             value = list(signal.value) if signal.value is not None else None

@@ -22,7 +22,7 @@ from rotfem.scene.table import (
     problem,
     with_parameters,
 )
-from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, check_increasing
+from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_list, as_number, check_increasing
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
@@ -31,10 +31,9 @@ def _as_effects(value: Any) -> str | tuple[str, ...]:
 
 
 def _as_plate_elements(value: Any) -> tuple[int, int]:
-    entries = list(value) if isinstance(value, list | tuple) else [value, value]
-    if len(entries) != 2 or any(type(n) is not int or not 1 <= n <= 10**6 for n in entries):
-        raise problem("", value, "must be an integer at least 1, or two of them [nx, ny]")
-    return entries[0], entries[1]
+    pair = value if isinstance(value, list | tuple) else [value, value]
+    nx, ny = as_list(pair, Bounds(ge=1, le=1e6).integer, "an integer at least 1, or two of them [nx, ny]", [2])
+    return nx, ny
 
 
 def _as_reduced(value: Any) -> bool | float:
@@ -235,10 +234,7 @@ def usual(given: Mapping[str, Any]) -> str:
 
 
 def _as_times(value: Any) -> tuple[float, ...]:
-    numbers = isinstance(value, list | tuple) and all(type(t) in (int, float) and np.isfinite(t) for t in value)
-    if not numbers or any(t < 0.0 for t in value):
-        raise problem("", value, "must be a list of times (s) of at least 0")
-    return tuple(sorted(float(t) for t in value))
+    return tuple(sorted(as_list(value, Bounds(ge=0.0).number, "a list of times (s) of at least 0")))
 
 
 Seconds = Annotated[Positive, Unit("s")]
@@ -325,16 +321,12 @@ class Time(SceneModel):
 
 
 def _as_orders(value: Any) -> tuple[int, ...]:
-    integer = Bounds(ge=1).integer
-    if not isinstance(value, list | tuple) or len(value) > 100:
-        raise problem("", value, "must be a list of at most 100 multiples of the speed, such as [1, 3, 6, 9]")
-    return tuple(sorted({integer(k) for k in value}))
+    shape = "a list of at most 100 multiples of the speed, such as [1, 3, 6, 9]"
+    return tuple(sorted(set(as_list(value, Bounds(ge=1).integer, shape, range(101)))))
 
 
 def _as_speed_range(value: Any) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise problem("", value, "must be two speeds, [lowest, highest] (rad/s)")
-    low, high = (Bounds(ge=0.0).number(speed) for speed in value)
+    low, high = as_list(value, Bounds(ge=0.0).number, "two speeds, [lowest, highest] (rad/s)", [2])
     if not low < high:
         raise problem("", value, "must be two speeds that increase")
     return low, high
@@ -387,13 +379,11 @@ def _as_quantities(value: Any) -> tuple[str, ...]:
 def _as_stations(value: Any) -> int | tuple[float, ...]:
     if type(value) is int and 2 <= value <= 10_000:
         return value
-    numbers = isinstance(value, list | tuple) and all(type(x) in (int, float) and np.isfinite(x) for x in value)
-    if not numbers or not 0 < len(value) <= 10_000:
-        why = "must be a list of positions along the beam (m), or how many there are, 2 to 10000"
-        raise problem("", value, why)
-    if any(b <= a for a, b in pairwise(value)):
+    why = "a list of positions along the beam (m), or how many there are, 2 to 10000"
+    places: tuple[float, ...] = as_list(value, as_number, why, range(1, 10_001))
+    if any(b <= a for a, b in pairwise(places)):
         raise problem("", value, "must be positions that increase")
-    return tuple(float(x) for x in value)
+    return places
 
 
 _FIELDS = ("vtx", "xdmf")

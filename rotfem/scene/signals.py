@@ -1,18 +1,19 @@
-"""Vectors that are constant, tabulated over time or (in Python) a function of time."""
+"""What is given over time, and of loads over the span too: constant, as a table, a function, or harmonic."""
 
 from __future__ import annotations
 
 import inspect
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
-import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from rotfem.scene.files import as_table
+from rotfem.scene.files import Check, as_table
 from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3, check_increasing, such
+from rotfem.scene.values import Matrix, Number, Positive, as_number, as_vector, check_increasing, such
 from rotfem.units import is_quantity
 
 
@@ -38,13 +39,93 @@ def time_table(column: str) -> PlainValidator:
     )
 
 
-def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
-    """Return rows (t, a1, a2, a3), the last column zero where it is not given; raise on anything else."""
-    rows = as_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)", check_increasing)
-    return tuple((*row, 0.0)[:4] for row in rows)
-
-
 TimeFunction = Annotated[Callable[[float], Any], function_of("the time t (s)")]
+
+
+#: A table, or a function in its place.
+Over: TypeAlias = Matrix | Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the vectors of a signal are.
+
+    Attributes:
+        unit: of their components.
+        sizes: numbers of components that are allowed.
+        columns: how rows of components are written, for messages.
+        padded: number of components that vectors are filled up to with zeros.
+    """
+
+    unit: str
+    sizes: tuple[int, ...]
+    columns: tuple[str, ...]
+    padded: int = 0
+
+    def vector(self, value: Any) -> tuple[float, ...]:
+        """Return components; raise if they are none. A number will do where one is allowed."""
+        value = Unit(self.unit).read(value)
+        if 1 in self.sizes and not (isinstance(value, list | tuple) and len(self.sizes) > 1):
+            return (as_number(value),)
+        return self._filled(as_vector(value, self.sizes))
+
+    def rows(self, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
+        """Return rows (what they are over, components), or the function of the same that stands in their place."""
+        names = ", ".join(over)
+        if callable(value):
+            if arguments(value) != len(over):
+                raise problem("", value, f"must be a function f({names}); it takes {arguments(value)} arguments")
+            function: Callable[..., Any] = value
+            return function
+        shape = "a table " + " or ".join(f"[[{names}, {columns}], …]" for columns in self.columns)
+        value = Unit(self.unit, tuple(OVER_UNITS[name] for name in over)).read(value)
+        table = as_table(value, info, [len(over) + size for size in self.sizes], shape, CHECKS[over])
+        return tuple((*row[: len(over)], *self._filled(row[len(over) :])) for row in table)
+
+    def _filled(self, vector: tuple[float, ...]) -> tuple[float, ...]:
+        return (*vector, *(0.0,) * (self.padded - len(vector)))
+
+
+ACCELERATION = Kind("m/s**2", (2, 3), ("a1, a2", "a1, a2, a3"), padded=3)
+FORCE = Kind("N", (2, 3), ("f1, f2", "f1, f2, f3"), padded=3)
+MOMENT = Kind("N*m", (1, 3), ("m", "m1, m2, m3"))
+PRESSURE = Kind("Pa", (1,), ("p",))
+
+
+def check_span(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str]) -> None:
+    """Refuse rows (x, …) whose x (m) decreases, or does not change; one x may stand in two of them: a jump."""
+    x = [row[0] for row in rows]
+    if len(rows) < 2 or x[0] == x[-1]:
+        raise problem("", value, f"must be {shape} with at least two rows at different x")
+    for i, (before, after) in enumerate(pairwise(x), start=2):
+        if after < before:
+            raise problem("", value, f"the first column must not decrease; {row_name(i)}: {after:g} < {before:g}")
+    most = max(Counter(x).items(), key=lambda item: item[1])
+    if most[1] > 2:
+        raise problem("", value, f"x = {most[0]:g} stands in {most[1]} rows; must be in one, or in two, where it jumps")
+
+
+def check_grid(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str]) -> None:
+    """Refuse rows (x, t, …) unless every x (m), at least two, stands with every t (s), at least two."""
+    found: dict[tuple[float, float], int] = {}
+    for i, (x, t, *_) in enumerate(rows, start=1):
+        if (x, t) in found:
+            raise problem("", value, f"{row_name(i)} gives x = {x:g}, t = {t:g} again, after {row_name(found[x, t])}")
+        found[x, t] = i
+    stations, times = (sorted({pair[k] for pair in found}) for k in (0, 1))
+    if len(stations) < 2 or len(times) < 2:
+        raise problem("", value, f"must be {shape} with at least two x and two t")
+    missing = next(((x, t) for x in stations for t in times if (x, t) not in found), None)
+    if missing is not None:
+        raise problem("", value, f"has no row for x = {missing[0]:g}, t = {missing[1]:g}; must have every t at every x")
+
+
+#: What a table is over ↦ what checks its rows.
+CHECKS: dict[tuple[str, ...], Check] = {("t",): check_increasing, ("x",): check_span, ("x", "t"): check_grid}
+
+#: Key of a table ↦ what its rows are over, and the units of that.
+OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
+OVER_UNITS = {"t": "s", "x": "m"}
 
 
 class Harmonic(SceneModel):
@@ -118,52 +199,47 @@ class Given(SceneModel):
 
 
 class Signal(Given):
-    """A vector over time; one with two components gets a third one, zero. Ask `at`, which covers all ways.
+    """A vector over time; one with two components gets a third one, zero.
 
     Attributes:
         value: constant components, or None.
-        table: rows (t, a1, a2, a3), linear between them and constant outside, or None.
-        function: Python function t (s) ↦ 2 or 3 components, or None.
+        table: rows (t, components), linear between them and constant outside, or None.
+        function: Python function t (s) ↦ components, or None.
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
+    VECTORS: ClassVar[Kind] = ACCELERATION
 
-    value: Annotated[tuple[float, ...], PlainValidator(as_padded_vector3), Unit("m/s**2")] | None = None
-    table: Annotated[Matrix, PlainValidator(_as_rows4), Unit("m/s**2", ("s",))] | None = None
+    value: tuple[float, ...] | None = None
+    table: Matrix | None = None
     function: TimeFunction | None = None
+
+    @field_validator("value", mode="plain")
+    @classmethod
+    def _read_value(cls, value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
+        return None if value is None else cls._kind(info).vector(value)
+
+    @field_validator(*OVER, mode="plain", check_fields=False)
+    @classmethod
+    def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
+        return None if value is None else cls._kind(info).rows(OVER[str(info.field_name)], value, info)
+
+    @classmethod
+    def _kind(cls, info: ValidationInfo) -> Kind:
+        return cls.VECTORS
+
+    @property
+    def time_table(self) -> Matrix | None:
+        """Its rows over time, None where there are none."""
+        return self.table
+
+    @property
+    def time_function(self) -> Callable[[float], Any] | None:
+        """The function of time that it is, None where it is none."""
+        return self.function
 
     @property
     def vectors(self) -> Iterator[tuple[float, ...]]:
         """The value, or the rows without their times; none of a function."""
-        yield from (row[1:] for row in self.table or ())
         yield from () if self.value is None else (self.value,)
-
-    @property
-    def constant(self) -> bool:
-        """Whether it does not change with time; a function is taken to."""
-        return self.function is None and len(set(self.vectors)) == 1
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is zero at all times; a function is taken not to be."""
-        return self.function is None and not any(any(vector) for vector in self.vectors)
-
-    @property
-    def knots(self) -> tuple[float, ...] | None:
-        """Times (s) between which it is linear; None of a function."""
-        return None if self.function is not None else tuple(row[0] for row in self.table or ())
-
-    def at(self, t: float) -> Array:
-        """Return the components at time t (s), shape (components,)."""
-        if self.function is not None:
-            given = np.asarray(self.function(t), dtype=np.float64).ravel()
-            return np.append(given, 0.0) if given.size == 2 else given
-        if self.table is not None:
-            times, *columns = self._columns
-            return np.array([np.interp(t, times, column) for column in columns])
-        return np.array(self.value, dtype=np.float64)
-
-    @cached_property
-    def _columns(self) -> tuple[Array, ...]:
-        """Columns of the table as arrays; kept, because a time history asks for them at every step."""
-        return tuple(np.ascontiguousarray(np.array(self.table, dtype=np.float64).T))
+        yield from (row[1:] for row in self.time_table or ())

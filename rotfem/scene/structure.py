@@ -13,7 +13,7 @@ from pydantic import ConfigDict, PlainValidator
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
 from rotfem.scene.table import SceneModel, Unit, did_you_mean, problem, problems_at
-from rotfem.scene.values import Bounds, NonNegative, as_vector, such
+from rotfem.scene.values import Bounds, NonNegative, as_list, as_vector, such
 
 
 @dataclass(frozen=True)
@@ -97,10 +97,10 @@ def _as_modal(value: Any) -> Ratios:
 
 def _as_ratios(value: Any, key: str) -> tuple[float, ...]:
     """Return ratios in the order of frequency; a number is one."""
-    entries = value if isinstance(value, list | tuple) else [value]
-    many = "must be damping ratios (0.005 is half a per cent); one " if entries is value else ""
-    with problems_at(key, value, many):
-        return tuple(map(_RATIO.number, entries))
+    with problems_at(key, value):
+        if not isinstance(value, list | tuple):
+            return (_RATIO.number(value),)
+        return as_list(value, _RATIO.number, "a list of damping ratios (0.005 is half a per cent)")
 
 
 class Damping(SceneModel):

@@ -7,7 +7,7 @@ become tuples, so that a validated scene cannot be changed by accident.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from typing import Annotated, Any, TypeAlias, cast
@@ -138,13 +138,19 @@ def such(read: Callable[[Any], Any], holds: Callable[[Any], Any], allowed: str) 
     return PlainValidator(validated)
 
 
+def as_list(
+    value: Any, read: Callable[[Any], Any], shape: str, sizes: Container[int] = range(2**31)
+) -> tuple[Any, ...]:
+    """Return a list with its entries read; raise if it is none, or has not an allowed number of entries."""
+    if not isinstance(value, list | tuple) or len(value) not in sizes:
+        raise problem("", value, f"must be {shape}")
+    with problems_at("", value, f"must be {shape}; an entry "):
+        return tuple(map(read, value))
+
+
 def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
     """Return a vector as a tuple of floats; raise if it has not one of the allowed sizes."""
-    shape = f"must be a list of {' or '.join(map(str, sizes))} numbers"
-    if not isinstance(value, list | tuple) or len(value) not in sizes:
-        raise problem("", value, shape)
-    with problems_at("", value, f"{shape}; an entry "):
-        return tuple(map(as_number, value))
+    return as_list(value, as_number, f"a list of {' or '.join(map(str, sizes))} numbers", sizes)
 
 
 def as_vector3(value: Any) -> Vector3:

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 import rotfem
 from rotfem.commands.loads import loads_of
+from rotfem.commands.problem import motion_of
 from rotfem.errors import ComputationError, Problem, SceneError
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
@@ -192,13 +193,12 @@ def test_dead_and_follower_loads() -> None:
 
 
 def test_base_acceleration_as_table_and_function() -> None:
-    table = scene(motion__base_acceleration=[[0, 1, 0, 0], [2, 3, 0, 0]]).motion.base_acceleration
-    assert table is not None
-    np.testing.assert_allclose(table.at(1.0), [2, 0, 0])
-    function = scene(motion__base_acceleration=lambda t: (t, -t)).motion.base_acceleration
-    assert function is not None
-    assert not function.constant
-    np.testing.assert_allclose(function.at(2.0), [2, -2, 0])
+    table = motion_of(scene(motion__base_acceleration=[[0, 1, 0, 0], [2, 3, 0, 0]]))
+    np.testing.assert_allclose(table.base_acceleration(1.0), [2, 0, 0])
+    assert (table.constant, table.is_accelerated, table.base_knots) == (False, True, (0.0, 2.0))
+    function = motion_of(scene(motion__base_acceleration=lambda t: (t, -t)))
+    assert (function.constant, function.is_accelerated, function.base_knots) == (False, True, None)
+    np.testing.assert_allclose(function.base_acceleration(2.0), [2, -2, 0])
 
 
 def test_numpy_values_are_welcome() -> None:

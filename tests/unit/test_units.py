@@ -10,7 +10,7 @@ import pytest
 from rotfem import Scene, SceneError
 from rotfem.commands.campbell import parse_speeds
 from rotfem.results.columns import ShownUnits
-from rotfem.scene import beams, loads, motion, plates, root, section, settings, signals, structure
+from rotfem.scene import beams, loads, motion, plates, root, section, settings, structure
 from rotfem.scene.table import has_unit
 from rotfem.units import quantity
 
@@ -125,7 +125,7 @@ TABLES = (
         root.PitchAngle,
         root.HarmonicAngle,
     ),
-    *(motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion, signals.Signal),
+    *(motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion),
     *(settings.Initial, settings.Time, loads.PointLoad, loads.Loads),
 )
 
