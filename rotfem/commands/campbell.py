@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -51,24 +52,20 @@ def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
     )
-    try:
+    speeds, why = list[float](), None
+    with suppress(ValueError):
         numbers, unit = split_unit(text)
         if ":" in numbers:
             first, last, number = numbers.split(":")
             ends, count = (float(first) * unit, float(last) * unit), int(number)
-            if (why := limits.refusal("speeds", count)) is not None:
-                raise SceneError("command line", "--speeds", text, why)
-            speeds = [float(s) for s in np.linspace(*ends, count)] if max(map(abs, ends)) <= LARGEST else []
+            why = limits.refusal("speeds", count)
+            if why is None and max(map(abs, ends)) <= LARGEST:
+                speeds = [float(s) for s in np.linspace(*ends, count)]
         else:
             speeds = [float(s) * unit for s in numbers.split(",")]
-    except SceneError:
-        raise
-    except ValueError:
-        raise SceneError("command line", "--speeds", text, allowed) from None
-    if (why := limits.refusal("speeds", len(speeds))) is not None:
-        raise SceneError("command line", "--speeds", text, why)
-    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
-        raise SceneError("command line", "--speeds", text, allowed)
+            why = limits.refusal("speeds", len(speeds))
+    if why or len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, why or allowed)
     return speeds
 
 
@@ -102,7 +99,15 @@ def campbell(
         SceneError: the scene or the speeds are not valid.
         ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
     """
-    scene = with_marks(as_scene(scene).showing("speed", speeds), orders, rated, operating)
+    marks: dict[str, Any] = {
+        "modes.orders": list(range(1, orders + 1)) if isinstance(orders, int) else orders,
+        "modes.rated": rated,
+        "modes.operating": operating,
+    }
+    as_list = {k: list(v) for k, v in marks.items() if isinstance(v, Sequence) and not isinstance(v, str)}
+    marks = {k: v for k, v in (marks | as_list).items() if v is not None}
+    scene = as_scene(scene).showing("speed", speeds)
+    scene = scene.replace(marks) if marks else scene
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
 
@@ -111,24 +116,6 @@ def campbell(
         return diagram(variant, analysis_of(variant, problem, comm), values, started, progress, hint)
 
     return answered(scene, compute, comm, "campbell")
-
-
-def with_marks(
-    scene: Scene, orders: int | Sequence[int] | None, rated: float | str | None, operating: Sequence[float | str] | None
-) -> Scene:
-    """Return the scene with what its diagram is to mark, as far as that is given here.
-
-    Raises:
-        SceneError: it is not valid.
-    """
-    given = {
-        "modes.orders": range(1, orders + 1) if isinstance(orders, int) else orders,
-        "modes.rated": rated,
-        "modes.operating": operating,
-    }
-    changes = {key: list(v) if isinstance(v, Sequence) and not isinstance(v, str) else v for key, v in given.items()}
-    changes = {key: value for key, value in changes.items() if value is not None}
-    return scene.replace(changes) if changes else scene
 
 
 def diagram(

@@ -59,11 +59,11 @@ def modes(
     ] = None,
 ) -> None:
     """Compute natural frequencies, damping and mode shapes of SCENE."""
-    from rotfem.commands.modes import check_animated
     from rotfem.commands.modes import modes as analyse
 
-    if animate is not None:
-        check_animated(todo.scene, animate)
+    count = todo.scene.modes.count
+    if animate is not None and not 1 <= animate <= count:
+        raise SceneError("command line", "--animate", animate, f"must be from 1 to modes.count, {count}")
     result = analyse(
         todo.scene,
         sensitivities=sensitivities,

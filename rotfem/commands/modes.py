@@ -142,16 +142,6 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     return found
 
 
-def check_animated(scene: Scene, mode: int) -> None:
-    """See that a mode of a scene can be animated, before anything is computed.
-
-    Raises:
-        SceneError: no such mode is wanted.
-    """
-    if not 1 <= mode <= scene.modes.count:
-        raise SceneError("command line", "--animate", mode, f"must be from 1 to modes.count, {scene.modes.count}")
-
-
 def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | None:
     """Return the error of the frequencies at one speed by the theory; None where it is not known, or not wanted."""
     richer, motion = richer_problem(analysis.problem), analysis.system.held.motion.at_speed(spinning.speed)

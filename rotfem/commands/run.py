@@ -100,11 +100,6 @@ class Simulation:
         self.reduced: Response | None = None
         self.shape: Array | None = None
 
-    def advise(self, hint: Hint | None) -> None:
-        """Give the hints that there are before the computation starts."""
-        also = hints_of_start(self.scene, self.problem)
-        self.log.advice = advise(self.scene, "run", hint, critical=self.monitor.critical, also=also)
-
     def run(self, progress: Progress | None = None) -> RunResult:
         """Return the result of the scene (see `rotfem.run`).
 
@@ -406,7 +401,8 @@ def simulate(
         problem = Problem.of(variant, terms=terms, outputs=outputs)
         simulation = Simulation(variant, problem, store, setting, clock)
         if scene.accuracy is None:
-            simulation.advise(hint)
+            also, critical = hints_of_start(variant, simulation.problem), simulation.monitor.critical
+            simulation.log.advice = advise(variant, "run", hint, critical=critical, also=also)
         elif setting is not None and setting.reduced:
             check_rotations(variant, simulation.system)
         return simulation.run(progress)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 
-from rotfem.errors import InputError
 from rotfem.results.columns import ZERO, ShownUnits, described, label, label_of
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
@@ -68,12 +66,6 @@ MEANING = {
     "round_off": "arithmetic with 16 digits; no setting lessens it",
     "total": "all of them together",
 }
-
-
-def require() -> None:
-    """Raise an InputError where Bokeh is not installed."""
-    if find_spec("bokeh") is None:
-        raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")
 
 
 def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
