@@ -211,4 +211,4 @@ class Tracer:
         """Return q at the full load, between two points of the path."""
         part = (1.0 - before.s) / (after.s - before.s)
         q = before.q + part * (after.q - before.q)
-        return balance(self.system, self.growth, 1.0, q, self.newton, looked_at=False)
+        return balance(self.system, self.growth, 1.0, q, self.newton, checked=False)

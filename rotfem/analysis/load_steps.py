@@ -217,7 +217,7 @@ def counted(system: System, growth: Growth, share: float, q: Array, newton: Newt
 
 
 def balance(
-    system: System, growth: Growth, share: float, guess: Array, newton: Newton, *, looked_at: bool = True
+    system: System, growth: Growth, share: float, guess: Array, newton: Newton, *, checked: bool = True
 ) -> Array:
     """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads.
 
@@ -227,7 +227,7 @@ def balance(
         share: of it.
         guess: where to start, a local dof array.
         newton: iteration control.
-        looked_at: whether a state that is turned inside out is refused.
+        checked: whether a state that is turned inside out is refused.
     """
     growth.set(system, share)
     q, dx = guess.copy(), Increment(system.V)
@@ -243,7 +243,7 @@ def balance(
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))
-        if looked_at:
+        if checked:
             check_inside_out(system)
     return q
 

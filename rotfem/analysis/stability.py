@@ -241,7 +241,7 @@ def constant_stability(system: Any, newton: Newton) -> Stability | None:
         return None
     system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
     try:
-        q = balance(system, Growth(speed), 1.0, system.zeros(), newton, looked_at=False)
+        q = balance(system, Growth(speed), 1.0, system.zeros(), newton, checked=False)
         return stability_of(system, q, speed)
     except ComputationError:
         return None

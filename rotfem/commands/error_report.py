@@ -270,7 +270,7 @@ def _relative(apart: float, scale: float) -> float:
 def check_rotations(scene: Scene, system: Any) -> None:
     """Refuse a linear model of motions whose rotations θ are too large: with foreshortening it errs by about θ²/2.
 
-    What is looked at is the static shape under what acts on the structure in the frame; of a free hub nothing is known
+    The rotations are those of the static shape under what acts in the frame. Of a free hub nothing is known
     before its motion.
 
     Args:

@@ -35,7 +35,7 @@ NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
 #: The same of steps.
-FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "too coarse: off by {:.1%}"}
+FINE = {"negligible": "fine enough", "noticeable": "in error by {:.1%}", "large": "too coarse: in error by {:.1%}"}
 
 #: What the notes of a check are marked with.
 FULL = " of the full model"
