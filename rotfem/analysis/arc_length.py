@@ -104,7 +104,8 @@ class Tracer:
                 continue
             turned = new.t_s * point.t_s < 0.0
             crossed = new.negative != point.negative and not turned
-            if length > SHORTEST and (crossed or self._dot(new, point) < 0.9):
+            cosine = self._product(new.t_q, point.t_q) + new.t_s * point.t_s
+            if length > SHORTEST and (crossed or cosine < 0.9):
                 length = max(length / 4, SHORTEST)
                 continue
             if turned:
@@ -189,9 +190,6 @@ class Tracer:
     def _product(self, a: Array, b: Array) -> float:
         """Return the mean of the products of two arrays in the scales of the unknowns, over all ranks."""
         return float(self.system.product(a, b) / self._count)
-
-    def _dot(self, a: Point, b: Point) -> float:
-        return self._product(a.t_q, b.t_q) + a.t_s * b.t_s
 
     # --- special points ----------------------------------------------------------------------------------------------
 

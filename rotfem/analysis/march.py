@@ -206,8 +206,12 @@ class AdaptiveSteps:
             if state.t >= self.end:
                 return
             if number % PACE == 0:
-                self._check_pace((state.t - began) / PACE, state.t)
-                began = state.t
+                advance, began = (state.t - began) / PACE, state.t
+                if self.end - state.t > 10 * MOST_STEPS * advance:
+                    what = (
+                        f"the last {PACE} steps were of {advance:.3g} s on average: {MOST_STEPS} do not reach the end"
+                    )
+                    raise ComputationError(what, time=state.t, advice=QUICKER)
             leg = self._next(state.t, wanted)
             if state.t == 0.0:
                 state = started(stepper, state, leg)
@@ -234,16 +238,6 @@ class AdaptiveSteps:
             state, stepper.pace = new, (wanted, self.largest, before)
             yield state
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
-
-    def _check_pace(self, advance: float, t: float) -> None:
-        """Refuse a march whose last steps were so short (s, on average) that it would not reach its end.
-
-        Raises:
-            ComputationError: it would take more than ten times the steps that there may be.
-        """
-        if self.end - t > 10 * MOST_STEPS * advance:
-            what = f"the last {PACE} steps were of {advance:.3g} s on average: {MOST_STEPS} do not reach the end"
-            raise ComputationError(what, time=t, advice=QUICKER)
 
     def _tried(self, start: State, leg: Leg) -> tuple[State, float]:
         """Return the state at the end of a leg, and its error as a part of what is allowed."""
@@ -306,7 +300,6 @@ class ErrorMeasure:
         self.inner, self.end, self.scheme = system.held, end, scheme
         self._e, self._b = (compat.create_vector(self.inner.V) for _ in range(2))
         self._filtered = Increment(self.inner.V)
-        self._displacements = [i for i, name in enumerate(self.inner.structure.components) if name.startswith("u")]
         self._kept: dict[int, list[list[DirectSolver]]] = {}
         self._mass: Any = None
 
@@ -328,7 +321,7 @@ class ErrorMeasure:
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of a local dof array, in units of their scale."""
-        return float(self.inner.sizes(x)[self._displacements].max())
+        return float(self.inner.sizes(x)[self.inner.structure.moves].max())
 
     def displacement(self, state: State) -> float:
         """Return the largest displacement of a state relative to the turning frame, in units of its scale."""

@@ -182,6 +182,7 @@ class ModalAnalysis:
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
         notes: remarks on these paths.
+        kept: the same modes with the stiff strains as unknowns.
     """
 
     def __init__(
@@ -201,17 +202,12 @@ class ModalAnalysis:
         self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) else None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
-        self._kept = KeptDigits(self.system)
+        self.kept = KeptDigits(self.system)
         self.past_limits, self.notes = False, list[str]()
         self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
-
-    @property
-    def digits_kept(self) -> bool:
-        """Whether pairs were computed with the stiff strains as unknowns, as round-off had spoilt them."""
-        return self._kept.used
 
     def check_count(self, count: int) -> None:
         """Refuse more modes than there are unknowns.
@@ -255,7 +251,7 @@ class ModalAnalysis:
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         if not self.free:
-            pairs = self._kept.better(pencil, pairs, count)
+            pairs = self.kept.better(pencil, pairs, count)
         for vectors in (pairs.right, pairs.left):
             vectors[self.system.held.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
@@ -283,7 +279,7 @@ class ModalAnalysis:
         if self.system.linear:
             return None
         sizes = np.sqrt(np.abs(K.getDiagonal().array))
-        moves = [name.startswith("u") for name in self.structure.components]
+        moves = self.structure.moves
         owned = self.system.V.dofmap.index_map.size_local * len(moves)
         nodes = sizes[:owned].reshape(-1, len(moves))
         nodes[:, moves] = nodes[:, moves].max(axis=1, keepdims=True)

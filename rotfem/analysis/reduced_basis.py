@@ -150,7 +150,7 @@ class ReducedAnalysis(ModalAnalysis):
         """
         for speed in (first, last):
             self._add(self._solve(speed, count))
-        if self.full.digits_kept:  # which the pieces do not keep
+        if self.full.kept.used:  # which the pieces do not keep
             return False
         self._project()
         gaps = [(first, last)]

@@ -375,10 +375,14 @@ class Stepper:
 
         A nonlinear stage may begin with a new one; a long way, and a balance of energy, need one in every iteration.
         """
-        held = self._factored == stage.shifts
-        if not self.system.keeps_factor or self._new_factor_pays(stage.t):
+        s, held = self.system, self._factored == stage.shifts
+        if not s.keeps_factor:
             return None
-        if not held and (self.system.linear or stage.over is not None or self._far or self._share < WHOLE):
+        if s.linear:
+            s.set_time(stage.t)
+            if s.settled and not s.current:  # the matrix stays as it is from now on, and the factor is that of another
+                return None
+        if not held and (s.linear or stage.over is not None or self._far or self._share < WHOLE):
             return None
         return OldFactor(held)
 
@@ -388,14 +392,6 @@ class Stepper:
         if self.newton.diverging:
             check_root(self.system, stage, state)
         return iterations
-
-    def _new_factor_pays(self, t: float) -> bool:
-        """Return whether the matrix stays as it is from now on, while the factor is that of another."""
-        s = self.system
-        if not s.linear:
-            return False
-        s.set_time(t)
-        return bool(s.settled and not s.current)
 
     def _iterate(self, stage: Stage, state: State, factor: OldFactor | None = None) -> int:
         """Solve a stage by Newton's method, with old factors as long as they serve if any do; return the iterations."""

@@ -84,10 +84,16 @@ class TheoryError:
 
     def warning(self) -> str:
         """Return the warning of an error that is to be noticed, or of components in error; empty of others."""
-        if not self.estimate > NOTICED:
-            return self._of_components()
-        how = "out of its range" if self.estimate >= 1.0 else f"in error by about {100 * self.estimate:.2g} %"
-        return f'model.theory = "{self.theory}" is {how} here ({self.basis}); "{richest().name}" is exact'
+        if self.estimate > NOTICED:
+            how = "out of its range" if self.estimate >= 1.0 else f"in error by about {100 * self.estimate:.2g} %"
+            return f'model.theory = "{self.theory}" is {how} here ({self.basis}); "{richest().name}" is exact'
+        wrong = {name: error for name, error in self.components.items() if error > NOTICED}
+        if not wrong:
+            return ""
+        sizes = {name: f"by {100 * error:.2g} % of it" if error < 1.0 else "unknown" for name, error in wrong.items()}
+        listed = ", ".join(f"{name} ({size})" for name, size in sizes.items())
+        how = f'in error by what the theory "{self.theory}" leaves out: {listed}'
+        return f'small components of the tip are {how}; "{richest().name}" is exact'
 
     def of_poorer(self, theory: Theory, apart: float, components: dict[str, float]) -> TheoryError:
         """Return the error of a poorer theory, whose answer differs from the one that this is the error of.
@@ -101,16 +107,6 @@ class TheoryError:
         sums = {name: components.get(name, 0.0) + self.components.get(name, 0.0) for name in sorted(names)}
         listed = {name: x for name, x in sums.items() if x > REPORTED}
         return TheoryError(self.estimate + apart, f'its answer against that of "{self.theory}"', theory.name, listed)
-
-    def _of_components(self) -> str:
-        """Return the warning of components that are far smaller than the error allows them to be known."""
-        wrong = {name: error for name, error in self.components.items() if error > NOTICED}
-        if not wrong:
-            return ""
-        sizes = {name: f"by {100 * error:.2g} % of it" if error < 1.0 else "unknown" for name, error in wrong.items()}
-        listed = ", ".join(f"{name} ({size})" for name, size in sizes.items())
-        how = f'in error by what the theory "{self.theory}" leaves out: {listed}'
-        return f'small components of the tip are {how}; "{richest().name}" is exact'
 
 
 class TheoryCheck:
@@ -147,19 +143,22 @@ class TheoryCheck:
         if displacement == 0.0:
             return self._as(rotation / 2, f"the largest rotation is {rotation:.2g}")
         tips = np.abs(self._tip(q)) if tips is None else tips
-        resolved, neglected = self._resolved(tips), max(displacement, rotation) / 2
+        moves, neglected = np.array(self.structure.moves), max(displacement, rotation) / 2
+        largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
+        resolved = tips > RESOLVED * largest  # more than round-off of displacements or of rotations
         small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
         if small:
             return self._as(neglected, f"the largest rotation is {rotation:.2g}")
         return self._computed(q, tips, resolved, rotation, time)
 
-    def _computed(self, q: Array, tips: Array, resolved: Array, rotation: float, time: float) -> TheoryError:
+    def _computed(self, q: Array, tips: Array, resolved: Any, rotation: float, time: float) -> TheoryError:
         """Return the error by the correction Δq of a state."""
         system, model = self.system, self.system.model
         r = self._residual(q)
         K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
         change = -Increment(system.V).solve(DirectSolver(K), r).copy()
-        estimate = self._relative(q, change)
+        smaller = min(self._sizes(q)[0], self._sizes(q + change)[0])  # of the states before and after
+        estimate = self._sizes(change)[0] / max(smaller, 1e-300)
         if rotation > 1.0:  # expansions in it converge too slowly for an estimate
             estimate = max(estimate, rotation)
         if model.problem.inactive:  # among them are the displacements that bending makes along the structure
@@ -169,20 +168,10 @@ class TheoryCheck:
         wrong = {name: float(x) for name, x in zip(names, errors, strict=True) if x > REPORTED}
         return replace(self._as(estimate, "its strains against the exact ones at the farthest state"), components=wrong)
 
-    def _relative(self, q: Array, change: Array) -> float:
-        """Return the size of a change of displacements over that of the smaller of the states before and after."""
-        return self._sizes(change)[0] / max(min(self._sizes(q)[0], self._sizes(q + change)[0]), 1e-300)
-
     def _tip(self, x: Array) -> Array:
         """Return all components of a displacement at the tip, relative to the turning frame."""
         whole = self.structure.whole_values(self.structure.tip_values(x))
         return np.asarray(self.system.seen_from_hub(whole[None, :], self.structure.length, self.system.time)[0])
-
-    def _resolved(self, tips: Array) -> Array:
-        """Return which components are more than round-off of displacements or of rotations."""
-        moves = np.array([name.startswith("u") for name in self.structure.components])
-        largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
-        return np.asarray(tips > RESOLVED * largest)
 
     def under_load(self, motion: Motion, factor: DirectSolver | None = None) -> TheoryError:
         """Return the error of the displacements under what is constant, which modes of a linear theory are not about.
@@ -218,10 +207,8 @@ class TheoryCheck:
 
     def _sizes(self, q: Array) -> tuple[float, float]:
         """Return the size of displacements over L, and the largest rotation component (rad)."""
-        sizes, names = self.system.sizes(q), self.structure.components
-        u = [size for size, name in zip(sizes, names, strict=True) if name.startswith("u")]
-        turns = [size for size, name in zip(sizes, names, strict=True) if not name.startswith("u")]
-        return float(np.linalg.norm(u)), float(max(turns, default=0.0))
+        sizes, moves = np.asarray(self.system.sizes(q)), np.array(self.structure.moves)
+        return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
 
     def _residual(self, q: Array) -> Any:
         """Return r at a state, a PETSc vector, zero at clamped unknowns; the state is set."""

@@ -72,17 +72,7 @@ class RunErrors:
     @property
     def _scale(self) -> float:
         """Largest displacement of the tip, m."""
-        return largest(np.column_stack([self.history[f"tip_{self._names[i]}"] for i in self._moves]))
-
-    @property
-    def _names(self) -> tuple[str, ...]:
-        names: tuple[str, ...] = self.system.structure.components
-        return names
-
-    @property
-    def _moves(self) -> list[int]:
-        """Numbers of the components that are displacements."""
-        return [i for i, name in enumerate(self._names) if name.startswith("u")]
+        return largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS["tip"])]))
 
     def estimate(self) -> ErrorEstimate | None:
         """Return the error, relative to the largest value of its output; None if not wanted, or nothing was computed.
@@ -111,7 +101,7 @@ class RunErrors:
             return TheoryError(self.reduced.foreshortening, basis, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
-        names, moves = self._names, self._moves
+        names, moves = self.system.structure.components, self.system.structure.moves
         tips = np.array([np.max(np.abs(self.history[f"tip_{name}"])) for name in names])
         initial = self.scene.initial
         from_rest = self.scene.time is not None and initial.state == "undeformed" and initial.first is None
@@ -133,8 +123,8 @@ class RunErrors:
             return None
         sizes = tips[moves]
         resolved = sizes > RESOLVED * np.max(sizes, initial=0.0)
-        each = zip(moves, components, sizes, resolved, strict=True)
-        own = {f"tip_{names[i]}": d / size for i, d, size, known in each if known}
+        each = zip(np.array(names)[moves], components, sizes, resolved, strict=True)
+        own = {f"tip_{name}": d / size for name, d, size, known in each if known}
         return base.of_poorer(self.problem.theory, apart, own)
 
     def _drifting(self, found: TheoryError | None) -> TheoryError | None:
@@ -189,7 +179,7 @@ class RunErrors:
         if own is not None:
             accuracy, bent = accuracy_of(self.scene), own.manifold is not None
             there = own if same else reduced_response(system, own.times, self.start(system).q, accuracy, bent)
-            return there.tips[:, self._moves]
+            return there.tips[:, system.structure.moves]
         solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
         if same and self.shape is not None:
             q = self.shape.copy()

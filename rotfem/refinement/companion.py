@@ -64,11 +64,6 @@ class Followed:
         """Whether there are two."""
         return len(self.steps) > 1
 
-    def and_then(self, other: Followed) -> Followed:
-        """Return both as one."""
-        leg = replace(other.leg, length=self.leg.length + other.leg.length)
-        return Followed(leg, self.steps + other.steps)
-
     def state_at(self, t: float, order: int, comm: MPI.Comm) -> State:
         """Return the state at a time (s) as a row of a history has it."""
         old, new = next(pair for pair in self.steps if t <= pair[1].t)
@@ -214,7 +209,8 @@ class Companion:
         if single is not None:
             self.waiting[0] = None
             if single.leg.doubles(leg):
-                self._is_known(single.and_then(step))
+                length = single.leg.length + leg.length
+                self._is_known(Followed(replace(leg, length=length), single.steps + step.steps))
                 return
             self._is_known(single)
         if self.doubles and leg.doubles(leg):
@@ -356,21 +352,11 @@ class HistoryErrors:
             scale: largest value of the output.
         """
         self.steps.finish()
-        return {"time": self._of_steps(scale), "space": self._of_mesh(scale)}
-
-    def _of_steps(self, scale: float) -> float | None:
-        state, steps = self.steps.state, self.steps
-        if not steps.sound or state is None or not steps.doubled > state.t / 2:  # the lesser part says too little
-            return None
-        whole = steps.difference[0] * max(1.0, state.t / steps.doubled)  # as if all of it had been doubled
-        order = self.scheme.order if self.scheme.order <= CERTAIN else 0
-        return error_of(_relative(whole, scale), order)
-
-    def _of_mesh(self, scale: float) -> float | None:
-        if self.mesh is None or self.other is None or not self.steps.sound or not self.mesh.sound:
-            return None
-        return self.other.error(_relative(self.mesh.difference[0], scale))
-
-
-def _relative(size: float, scale: float) -> float:
-    return size / scale if scale > 0.0 else 0.0
+        steps, mesh, scale = self.steps, self.mesh, scale if scale > 0.0 else np.inf
+        out: dict[str, float | None] = {"time": None, "space": None}
+        if steps.sound and steps.state is not None and steps.doubled > steps.state.t / 2:  # less says too little
+            whole = steps.difference[0] * max(1.0, steps.state.t / steps.doubled)  # as if all of it had been doubled
+            out["time"] = error_of(whole / scale, self.scheme.order if self.scheme.order <= CERTAIN else 0)
+        if steps.sound and mesh is not None and mesh.sound and self.other is not None:
+            out["space"] = self.other.error(mesh.difference[0] / scale)
+        return out

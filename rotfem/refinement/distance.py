@@ -17,8 +17,7 @@ Output = Callable[[Any, State], Array]
 def tip(system: Any, state: State) -> Array:
     """Return the displacement of the tip in the frame that turns with the hub, m."""
     system.count_rotations_from(state.reference)
-    moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
-    return np.asarray(system.tip(state.q, state.t)[moves])
+    return np.asarray(system.tip(state.q, state.t)[system.structure.moves])
 
 
 def root_moment(system: Any, state: State) -> Array:

@@ -197,6 +197,6 @@ def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time:
     change = np.array(errors, dtype=float) * np.abs(lam)
     lasting = np.minimum(time, 1.0 / np.maximum(-lam.real, 1.0 / time))
     out = np.abs(part) * np.minimum(change * lasting, 2.0)  # which is out of phase
-    tip, moves = tip_output(system).read, [name.startswith("u") for name in system.structure.components]
-    lengths = [np.linalg.norm(tip(x, 0.0)[moves]) for x in pairs.right.T]
+    tip = tip_output(system).read
+    lengths = [np.linalg.norm(tip(x, 0.0)[system.structure.moves]) for x in pairs.right.T]
     return float(np.sum(out * lengths, where=lam.imag > 0.0) * 2.0)  # with the conjugate pairs

@@ -134,6 +134,11 @@ class Structure:
         """Return whether the undeformed structure of these data is symmetric about one of its `planes`."""
         return False
 
+    @cached_property
+    def moves(self) -> list[bool]:
+        """Of every component whether it is a displacement; the others are rotations."""
+        return [name.startswith("u") for name in self.components]
+
     @property
     def unknowns(self) -> tuple[str, ...]:
         """Names of the unknowns of a node: of the active components."""

@@ -154,8 +154,7 @@ class ReducedModel:
 
     def largest(self, tips: Array) -> float:
         """Return the largest length of displacement vectors of the tip (n, components), m."""
-        moves = [name.startswith("u") for name in self.system.structure.components]
-        return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
+        return float(np.linalg.norm(tips[:, self.system.structure.moves], axis=1).max(initial=0.0))
 
     def of_spin(self, effect: str, degree: int) -> tuple[Array, Array]:
         """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis, without prestress.
