@@ -22,8 +22,7 @@ from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_ro
 from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import shared_out
-from rotfem.commands.summary import modal_summary
+from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import SceneError
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work

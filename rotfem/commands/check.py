@@ -12,8 +12,7 @@ from mpi4py import MPI
 
 from rotfem.commands.fields import BETWEEN, columns_of
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import communicator
-from rotfem.commands.summary import summary
+from rotfem.commands.processes import communicator, summary
 from rotfem.equations.functionals import rigid_body
 from rotfem.equations.model import Model
 from rotfem.errors import input_of

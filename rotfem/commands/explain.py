@@ -16,9 +16,8 @@ from rotfem.commands.first_state import first_state
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, scheme_of
-from rotfem.commands.processes import communicator
+from rotfem.commands.processes import communicator, summary
 from rotfem.commands.run import run
-from rotfem.commands.summary import summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work

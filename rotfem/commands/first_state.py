@@ -67,23 +67,18 @@ def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True
     Raises:
         ComputationError: there is no static shape, or no equilibrium, or an unstable one.
     """
-    start, motion = _shape(scene, problem, system, judged), first_motion(scene)
-    if motion is not None:
-        analysis = ModalAnalysis(problem, scene.initial.state, comm=system.comm, system=system)
-        start.q, start.v = motion.about(start.q, analysis, Newton.of(scene.solver))
-    return start
-
-
-def _shape(scene: Scene, problem: Problem, system: Any, judged: bool) -> Start:
-    """Return a start at rest (see `first_state`)."""
-    initial, solver = scene.initial, scene.solver
+    initial, newton, start = scene.initial, Newton.of(scene.solver), Start()
     if initial.state == "steady":
-        return _equilibrium(scene, problem, system, judged)
-    start = Start(stability=constant_stability(system, Newton.of(solver)) if judged else None)
-    if start.stability is not None and (said := start.stability.warning()):
-        start.warnings.append(f"what constant conditions hold in balance: {said}")
+        start = _equilibrium(scene, problem, system, judged)
+    elif judged:
+        start.stability = constant_stability(system, newton)
+        if start.stability is not None and (said := start.stability.warning()):
+            start.warnings.append(f"what constant conditions hold in balance: {said}")
     if initial.tip_displacement is not None:
-        start.q = static_tip_shape(problem, initial.tip_displacement, Newton.of(solver), system.comm)
+        start.q = static_tip_shape(problem, initial.tip_displacement, newton, system.comm)
+    if (motion := first_motion(scene)) is not None:
+        analysis = ModalAnalysis(problem, initial.state, comm=system.comm, system=system)
+        start.q, start.v = motion.about(start.q, analysis, newton)
     return start
 
 

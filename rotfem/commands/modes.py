@@ -25,8 +25,7 @@ from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import communicator
-from rotfem.commands.summary import modal_summary
+from rotfem.commands.processes import communicator, modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work

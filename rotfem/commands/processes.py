@@ -1,21 +1,27 @@
-"""How several processes share one command: a large system shares its mesh, of a small one each has a copy.
+"""How several processes share one command, and what all summaries have in common.
 
-With a copy on every process nothing is communicated within a solution, and all have the whole result. What there is
-many of, speeds or frequencies, is then shared out; a history or one set of modes is computed by each.
+A large system shares its mesh, of a small one each process has a copy. With a copy on every process nothing is
+communicated within a solution, and all have the whole result. What there is many of, speeds or frequencies, is then
+shared out; a history or one set of modes is computed by each.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from time import perf_counter
 from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.theory_error import TheoryError
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import resolved, structures
+from rotfem.scene import Scene
+from rotfem.version import versions
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -49,20 +55,6 @@ def unknowns(problem: Problem) -> float:
     return float(len(kind.components) * math.prod(n * mesh.degree + 1 for n in cells))
 
 
-def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
-    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing".
-
-    Args:
-        command: the verb.
-        comm: all processes of the command.
-        inner: those that the system is discretised on.
-    """
-    if comm.size == 1:
-        return {"ranks": 1}
-    copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
-    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else copies}
-
-
 def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.Comm) -> list[Found]:
     """Return what some work makes of every item, on all ranks; each rank does neighbouring items in their order.
 
@@ -87,3 +79,51 @@ def raise_first(problems: Iterable[Exception | None]) -> None:
     for problem in problems:
         if problem is not None:
             raise problem
+
+
+# --- what the summaries of all commands have in common ----------------------------------------------------------------
+
+
+def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
+    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing".
+
+    Args:
+        command: the verb.
+        comm: all processes of the command.
+        inner: those that the system is discretised on.
+    """
+    if comm.size == 1:
+        return {"ranks": 1}
+    copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
+    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else copies}
+
+
+def summary(command: str, scene: Scene, comm: MPI.Comm, inner: MPI.Comm | None = None) -> dict[str, Any]:
+    """Return what every summary has; `inner` are the processes that the system is discretised on, all if None."""
+    out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name, "versions": versions()}
+    return {**out, **what_is_shared(command, comm, inner or comm), "scene": scene.digest()}
+
+
+def timings(parts: Mapping[str, float], started: float, before: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Return the parts (s) of a computation, the rest of it since it started, and the total with what was before."""
+    before = before or {}
+    total = perf_counter() - started + sum(before.values())
+    named = {**before, **parts}
+    return {**named, "other": total - sum(named.values()), "total": total}
+
+
+def modal_summary(
+    command: str, analysis: ModalAnalysis, scene: Scene, started: float, theory: TheoryError | None
+) -> dict[str, Any]:
+    """Return what the summaries of modes and Campbell diagrams have in common, started at a `perf_counter()`."""
+    space = analysis.system.V.dofmap
+    return {
+        **summary(command, scene, analysis.everyone, analysis.comm),
+        "theory": analysis.problem.theory.name,
+        **({} if analysis.fixed is None else {"frame": "fixed"}),
+        "about": "undeformed" if analysis.system.linear else analysis.about,
+        "effects": list(analysis.model.effects),
+        "dofs": space.index_map.size_global * space.index_map_bs,
+        "timings": timings(analysis.seconds, started),
+        **({} if theory is None else {"theory_error": theory.summary()}),
+    }

@@ -32,8 +32,7 @@ from rotfem.commands.loads import SWEPT, frozen_in_frame, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import shared_out
-from rotfem.commands.summary import modal_summary
+from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import SceneError, input_of
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult

@@ -33,11 +33,10 @@ from rotfem.commands.interrupts import together
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
-from rotfem.commands.processes import communicator
+from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Recorder, reduced_history
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.run_store import Interval, RunStore
-from rotfem.commands.summary import summary, timings
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
