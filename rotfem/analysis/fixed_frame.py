@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rotfem.errors import InputError
-from rotfem.numerics.low_rank import sparse_part
+from rotfem.numerics.projection import sparse_part
 
 KEY = "structure.supports"
 

@@ -32,8 +32,7 @@ from rotfem.numerics import forms
 from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED, set_diagonal
-from rotfem.numerics.low_rank import sparse_part
-from rotfem.numerics.projection import summed
+from rotfem.numerics.projection import sparse_part, summed
 
 Array = npt.NDArray[Any]
 

@@ -20,7 +20,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.modal_damping import KEY
 from rotfem.errors import InputError, OutputError, SceneError
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.low_rank import PlusLowRank, sparse_part
+from rotfem.numerics.projection import PlusLowRank, sparse_part
 
 Array = npt.NDArray[Any]
 

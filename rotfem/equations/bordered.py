@@ -28,7 +28,7 @@ from rotfem.mechanics import work
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, weighted
 from rotfem.numerics.linear import Increment
-from rotfem.numerics.low_rank import PlusLowRank
+from rotfem.numerics.projection import PlusLowRank
 from rotfem.structures.root_reaction import along_axis
 
 

@@ -7,7 +7,7 @@ force of damping is C v with
 
 for which φ_jᵀ C φ_k is 2 ζ_j ω_j where j = k and zero elsewhere (Wilson & Penzien 1972), so that these modes are damped
 with their ratios and no other mode at rest is. C is constant in the rotating frame: it is added to the equations of
-every theory, at every speed. It is of few columns but dense, and is never written out (see `rotfem.numerics.low_rank`).
+every theory, at every speed. It is of few columns but dense, and never written out (see `rotfem.numerics.projection`).
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from mpi4py import MPI
 from rotfem.errors import InputError
 from rotfem.numerics.damped import MORE
 from rotfem.numerics.eigenproblem import Pencil
-from rotfem.numerics.low_rank import LowRank
-from rotfem.numerics.projection import summed, times
+from rotfem.numerics.projection import LowRank, summed, times
 
 Array = npt.NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.low_rank import PlusLowRank
+from rotfem.numerics.projection import PlusLowRank
 from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.turning_clamp import TurningClamp
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.mechanics.free_hub import FreeHub, Torque
+from rotfem.mechanics.free_hub import Torque
 from rotfem.mechanics.loads import AnyLoad, PlaceLoad
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch
@@ -148,12 +148,13 @@ def _watched_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float]
         signal.known = base is not None
         changes["base_acceleration"] = see(signal)
     if motion.hub is not None:
-        if len(motion.hub.torque.knots):
-            changes["hub"] = _watched_hub(motion.hub, see)
+        if len((torque := motion.hub.torque).knots):
+            signal = TimeSignal("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
+            changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, see(signal)))
     elif motion.changes_speed:
         known = motion.smooth or motion.breakpoints is not None
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
-            many = _columns(f) if motion.arrays else None
+            many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
             signal = TimeSignal(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
             signal.continuous = name == "speed"
             changes[name] = see(signal)
@@ -171,18 +172,8 @@ def _watched_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], A
     return replace(pitch, **changes)
 
 
-def _watched_hub(hub: FreeHub, see: Callable[[TimeSignal], Callable[[float], Any]]) -> FreeHub:
-    torque = hub.torque
-    signal = TimeSignal("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
-    return replace(hub, torque=SeenTorque(torque.pulses, torque.table, see(signal)))
-
-
 def _times(knots: Iterable[float] | None) -> Array:
     return np.array(() if knots is None else knots, dtype=float)
-
-
-def _columns(f: Callable[[Any], Any]) -> Callable[[Array], Array]:
-    return lambda t: np.asarray(f(t))[:, None]
 
 
 def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:

@@ -19,8 +19,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver
-from rotfem.numerics.low_rank import sparse_part
-from rotfem.numerics.projection import new_directions, summed, times
+from rotfem.numerics.projection import new_directions, sparse_part, summed, times
 
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any]

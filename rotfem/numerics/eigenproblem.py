@@ -34,8 +34,7 @@ from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unk
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
 from rotfem.numerics.gyroscopic import gyroscopic_pairs
 from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
-from rotfem.numerics.low_rank import Sendable, sparse_part
-from rotfem.numerics.projection import summed, times
+from rotfem.numerics.projection import Sendable, sparse_part, summed, times
 
 
 class RoundOff:
@@ -198,12 +197,6 @@ class Eigenpairs:
 def basis_of(wanted: int, unknowns: int) -> int:
     """Return how many vectors the basis of SLEPc's solver has for so many eigenvalues of 2n, n the unknowns."""
     return min(max(3 * wanted, wanted + 20), 2 * unknowns)
-
-
-def dense(A: Any) -> Array:
-    """Return a PETSc matrix of one process as an array."""
-    indptr, indices, data = A.getValuesCSR()
-    return np.asarray(csr_array((data, indices, indptr), shape=A.getSize()).toarray())
 
 
 def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tuple[Array, Array, Array]:
@@ -415,7 +408,7 @@ class Pencil(Sendable):
         n = K.getSize()[0]
         wanted = min(2 * count + 2, 2 * n - 2)
         if self.comm.size == 1 and basis_of(wanted, n) == 2 * n:
-            return dense_pairs(dense(M), dense(C), dense(K), wanted, target)
+            return dense_pairs(M[:, :], C[:, :], K[:, :], wanted, target)
         symmetric = target == 0.0 and self.conservative
         pep = self._solver(M, C, K, wanted, target)
         st = pep.getST()

@@ -256,7 +256,7 @@ def zeroed(expanded: Any, *functions: Any) -> Any:
     if isinstance(expanded, ufl.Form) and expanded.empty():
         return expanded
     zero = {u: ufl.as_vector([0] * u.ufl_shape[0]) for u in functions}
-    return map_integrand_dags(_NoEmptyBranches(), ufl.replace(expanded, zero))
+    return map_integrand_dags(_Branches(), ufl.replace(expanded, zero))
 
 
 def containing(f: ufl.Form, function: Any) -> ufl.Form:
@@ -286,29 +286,27 @@ def at_rest(f: Any, q: Any, v: Any, a: Any, undeformed: bool = False) -> dict[st
     return {"f": rest, "K": ufl.derivative(rest, q, du), "C": without(C, v), "M": expand_derivatives(M)}
 
 
-class _NoEmptyBranches(MultiFunction):  # type: ignore[misc]
-    """Makes a conditional zero whose branches are both zero: UFL leaves it, and does not know what to add it to."""
+def first_branches(e: Any) -> Any:
+    """Return a UFL expression with the first branch of each conditional, the one that can be derived at rest.
+
+    The derivatives of both branches are added up, 0/0 of the other with them.
+    """
+    return map_expr_dag(_Branches(first=True), e)
+
+
+class _Branches(MultiFunction):  # type: ignore[misc]
+    """Makes a conditional its first branch, or zero where both are: UFL leaves it, and knows not what to add it to."""
 
     expr = MultiFunction.reuse_if_untouched
+
+    def __init__(self, first: bool = False):
+        super().__init__()
+        self._first = first
 
     def conditional(self, o: Any, condition: Any, true: Any, false: Any) -> Any:
         if isinstance(true, Zero) and isinstance(false, Zero):
             return Zero(o.ufl_shape, o.ufl_free_indices, o.ufl_index_dimensions)
-        return self.reuse_if_untouched(o, condition, true, false)
-
-
-def first_branches(e: Any) -> Any:
-    """Return a UFL expression with the first branch of each conditional, the one that can be derived at rest."""
-    return map_expr_dag(_FirstBranches(), e)
-
-
-class _FirstBranches(MultiFunction):  # type: ignore[misc]
-    """Takes the first branch of a conditional: the derivatives of both are added up, 0/0 of the other with them."""
-
-    expr = MultiFunction.reuse_if_untouched
-
-    def conditional(self, o: Any, condition: Any, true: Any, false: Any) -> Any:
-        return true
+        return true if self._first else self.reuse_if_untouched(o, condition, true, false)
 
 
 def quadrature_points(domain: Any, number: int) -> Any:

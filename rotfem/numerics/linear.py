@@ -18,8 +18,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import compat
-from rotfem.numerics.low_rank import PlusLowRank, Update, sparse_part
-from rotfem.numerics.projection import dense
+from rotfem.numerics.projection import PlusLowRank, Update, dense, sparse_part
 
 Array = npt.NDArray[np.float64]
 

@@ -1,7 +1,14 @@
-"""Matrices of a system times the columns of a basis, and bases that are orthonormal; columns hold owned unknowns."""
+"""Matrices of a system times columns of owned unknowns, orthonormal bases, and A + c B Bᵀ with a B of few columns.
+
+B Bᵀ is never written out, as it would fill a sparse matrix. Equations with A + c B Bᵀ are solved with a factor of A
+(Sherman, Morrison & Woodbury; Golub & Van Loan 2013, 2.1.4):
+
+    (A + c B Bᵀ)⁻¹ b = x − Z (1 + c BᵀZ)⁻¹ c Bᵀx,    A x = b,  A Z = B.
+"""
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable
 from typing import Any
 
@@ -84,3 +91,155 @@ def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array
         keep = energies > 1e-13 * energies[-1]
         V = np.asarray(V @ (turns[:, keep] / np.sqrt(energies[keep])))
     return V
+
+
+# --- few columns ------------------------------------------------------------------------------------------------------
+
+
+def _from_rows(size: tuple[int, int], rows: tuple[Array, Array, Array]) -> Any:
+    """Return a PETSc matrix of this process alone, by the arrays of its compressed rows."""
+    return PETSc.Mat().createAIJ(size, csr=rows, comm=MPI.COMM_SELF)
+
+
+copyreg.pickle(PETSc.Mat, lambda A: (_from_rows, (A.getSize(), A.getValuesCSR())))
+
+
+class Sendable:
+    """What holds matrices of one process alone, and can be sent to another one, without what it belongs to."""
+
+    comm: MPI.Comm
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("comm", "owner")}
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        vars(self).update(known, comm=MPI.COMM_SELF, owner=None)
+
+
+class LowRank(Sendable):
+    """B Bᵀ; to those who multiply by it, it looks like a PETSc matrix.
+
+    Args:
+        B: owned rows, shape (n, m).
+        like: a PETSc matrix whose rows are shared out as those of B are.
+
+    Attributes:
+        B: its columns.
+    """
+
+    def __init__(self, B: Array, like: Any):
+        self.B, self._like = B, like
+        self.comm: MPI.Comm = like.comm.tompi4py()
+
+    def along(self, X: Array) -> Array:
+        """Return BᵀX of columns or a vector of owned rows, over all ranks."""
+        return np.asarray(summed(self.comm, self.B.T @ X))
+
+    def times(self, X: Array) -> Array:
+        """Return B BᵀX of columns or a vector of owned rows."""
+        return self.B @ self.along(X)
+
+    def mult(self, x: Any, y: Any) -> None:
+        """Write the product with a PETSc vector into another one."""
+        y.array[:] = self.times(x.array)
+
+    def createVecs(self) -> tuple[Any, Any]:
+        """Return two PETSc vectors that fit."""
+        return tuple(self._like.createVecs())
+
+    def norm(self) -> float:
+        """Return the Frobenius norm."""
+        return float(np.linalg.norm(self.along(self.B)))
+
+    def bound(self) -> float:
+        """Return a bound of the largest sum of the sizes of a row's entries."""
+        columns = summed(self.comm, np.abs(self.B).sum(axis=0))
+        return float(self.comm.allreduce(float(np.max(np.abs(self.B) @ columns, initial=0.0)), op=MPI.MAX))
+
+    def scaled(self, rows: Array) -> LowRank:
+        """Return D B Bᵀ D with the owned part of a diagonal D."""
+        return LowRank(rows[:, None] * self.B, self._like)
+
+    def bordered(self) -> LowRank:
+        """Return it with one unknown more, the last on the last rank, that it has no part in."""
+        more = int(self.comm.rank == self.comm.size - 1)
+        return LowRank(np.vstack([self.B, np.zeros((more, self.B.shape[1]))]), self._like)
+
+
+class PlusLowRank:
+    """S + c B Bᵀ of a sparse S; to those who multiply, scale or solve (`DirectSolver`), it looks like a PETSc matrix.
+
+    Args:
+        sparse: S, a PETSc matrix.
+        part: B Bᵀ.
+        factor: c.
+    """
+
+    def __init__(self, sparse: Any, part: LowRank, factor: float = 1.0):
+        self.sparse, self.part, self.factor = sparse, part, factor
+
+    @property
+    def comm(self) -> Any:
+        """The communicator that its rows are distributed over."""
+        return self.sparse.comm
+
+    def createVecs(self) -> tuple[Any, Any]:
+        """Return two PETSc vectors that fit."""
+        return tuple(self.sparse.createVecs())
+
+    def times(self, X: Array) -> Array:
+        """Return (S + c B Bᵀ) X of columns of owned rows (n, m)."""
+        return times(self.sparse, X) + self.added(X)
+
+    def added(self, X: Array) -> Array:
+        """Return c B Bᵀ X of columns or a vector of owned rows."""
+        return np.asarray(self.factor * self.part.times(X))
+
+    def mult(self, x: Any, y: Any) -> None:
+        """Write the product with a PETSc vector into another one."""
+        self.sparse.mult(x, y)
+        y.array[:] += self.added(x.array)
+
+    def multTranspose(self, x: Any, y: Any) -> None:
+        """Write the product of the transpose with a PETSc vector into another one."""
+        self.sparse.multTranspose(x, y)
+        y.array[:] += self.added(x.array)
+
+    def norm(self, kind: Any = None) -> float:
+        """Return a bound of a norm, Frobenius or the PETSc kind INFINITY: that of S and that of the rest."""
+        rest = self.part.norm() if kind is None else self.part.bound()
+        return float(self.sparse.norm(kind) + abs(self.factor) * rest)
+
+    def scale(self, factor: float) -> None:
+        """Multiply it by a number."""
+        self.sparse.scale(factor)
+        self.factor *= factor
+
+    def diagonalScale(self, left: Any, right: Any) -> None:
+        """Make it D (S + c B Bᵀ) D of one diagonal D, a PETSc vector, given twice."""
+        self.sparse.diagonalScale(left, right)
+        self.part = self.part.scaled(left.array)
+
+
+def sparse_part(A: Any) -> Any:
+    """Return the sparse part of a matrix: itself, or S of S + c B Bᵀ."""
+    return A.sparse if isinstance(A, PlusLowRank) else A
+
+
+class Update:
+    """Makes solutions with A + c B Bᵀ of those with A.
+
+    Args:
+        part: B Bᵀ.
+        factor: c, real or complex.
+        solve: owned rows of b ↦ those of A⁻¹ b.
+    """
+
+    def __init__(self, part: LowRank, factor: complex, solve: Callable[[Array], Array]):
+        self._part, self._factor = part, factor
+        self._Z = np.stack([solve(b) for b in part.B.T], axis=1)
+        self._small = np.eye(part.B.shape[1]) + factor * part.along(self._Z)
+
+    def __call__(self, x: Array) -> Array:
+        """Return (A + c B Bᵀ)⁻¹ b of x = A⁻¹ b, owned rows."""
+        return np.asarray(x - self._Z @ np.linalg.solve(self._small, self._factor * self._part.along(x)))

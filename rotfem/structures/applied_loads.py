@@ -37,11 +37,7 @@ class Amplitude:
 
     def __init__(self, constant: fem.Constant):
         self.vector: Any = constant
-
-    @property
-    def value(self) -> Any:
-        """The amplitudes."""
-        return self.vector.value
+        self.value: Array = constant.value
 
     def turned(self, value: Array, turn: Array) -> Array:
         """Return the amplitudes of the turned vector (3, 3); one alone is about the axis of the turn."""
@@ -64,13 +60,8 @@ class SpanField(Amplitude):
 
     def __init__(self, function: fem.Function, basis: Array | None, places: npt.NDArray[np.int64] | None, size: int):
         self._function, self._basis, self._places = function, basis, places
-        self.follows_nodes, self._value = basis is None, np.zeros(size)
+        self.follows_nodes, self.value = basis is None, np.zeros(size)
         self.vector = function if function.ufl_shape else ufl.as_vector([function])
-
-    @property
-    def value(self) -> Any:
-        """The amplitudes a_k."""
-        return self._value
 
     @classmethod
     def of_shapes(cls, structure: Any, load: Load, n: int) -> SpanField:
@@ -117,7 +108,7 @@ class SpanField(Amplitude):
 
     def update(self, turn: Array | None = None) -> None:
         """Make the field of the amplitudes; vectors turned by a matrix (3, 3) if that is given."""
-        n, a = self._function.function_space.dofmap.bs, self._value
+        n, a = self._function.function_space.dofmap.bs, self.value
         dofs = a @ self._basis if self._basis is not None else a.reshape(-1, n)[self._places].ravel()
         if turn is not None and n > 1:
             dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()

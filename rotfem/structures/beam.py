@@ -16,12 +16,11 @@ from mpi4py import MPI
 from rotfem.mechanics.bodies import RootSpring, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
-from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import SectionField, Valid, not_negative
-from rotfem.structures.structure import Array, Structure, TipValues
+from rotfem.structures.structure import Array, Structure, TipValues, check_memory
 
 
 class Beam(Structure):

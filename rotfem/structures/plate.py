@@ -25,12 +25,11 @@ from rotfem.mechanics.loads import AnyLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.numerics import forms
-from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns, check_directors
-from rotfem.structures.structure import Array, Structure, TipValues
+from rotfem.structures.structure import Array, Structure, TipValues, check_memory
 
 
 def plate_points(plate: Structure) -> Points:

@@ -102,11 +102,17 @@ class RootReaction:
                 places[:, int(name[1]) - 1] += column
             elif name in ("theta1", "theta2", "theta3"):
                 theta[:, int(name[-1]) - 1] = column
-        out = np.zeros((values.size, len(self.names)))
-        for moved, name in zip(out.T, self.names, strict=True):
-            axis = np.eye(3)[int(name[1]) - 1]
-            moved[:] = (self._moved(arms, axis) if name[0] == "f" else self._turned(places, axis, theta)).ravel()
-        return out
+        out = np.zeros((owned, structure.size, len(self.names)))
+        for columns, name in zip(np.moveaxis(out, 2, 0), self.names, strict=True):
+            axis, force = np.eye(3)[int(name[1]) - 1], name[0] == "f"
+            moved = np.broadcast_to(axis, arms.shape) if force else np.cross(axis, places)
+            vectors = np.zeros_like(arms) if force else turned_vectors(theta, axis)
+            for column, unknown in zip(columns.T, structure.unknowns, strict=True):
+                if unknown in TURNS:
+                    column[:] = vectors @ TURNS[unknown]
+                elif unknown in ("u1", "u2", "u3"):
+                    column[:] = moved[:, int(unknown[1]) - 1]
+        return out.reshape(values.size, len(self.names))
 
     def _middle(self) -> Array:
         """Return the middle of what is clamped, of edges weighed by their length, (3,) in m."""
@@ -123,26 +129,3 @@ class RootReaction:
         here = np.append(lengths @ ends.mean(axis=1), lengths.sum())
         whole = s.comm.allreduce(here) if s.comm.size > 1 else here
         return np.asarray(whole[:3] / whole[3])
-
-    def _moved(self, arms: Array, direction: Array) -> Array:
-        """Return what the unknowns of the clamped nodes change by in a unit displacement, (nodes, unknowns)."""
-        parts = {f"u{i + 1}": direction[i] for i in range(3)}
-        return np.tile([parts.get(name, 0.0) for name in self._structure.unknowns], (len(arms), 1))
-
-    def _turned(self, arms: Array, axis: Array, theta: Array) -> Array:
-        """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns).
-
-        Args:
-            arms: of the nodes, from the point, (nodes, 3) in m.
-            axis: of the turn, (3,).
-            theta: rotation vectors there, (nodes, 3).
-        """
-        moved = np.cross(axis, arms)
-        vectors = turned_vectors(theta, axis)
-        out: Array = np.zeros((len(arms), self._structure.size))
-        for column, name in zip(out.T, self._structure.unknowns, strict=True):
-            if name in TURNS:
-                column[:] = vectors @ np.array(TURNS[name])
-            elif name in ("u1", "u2", "u3"):
-                column[:] = moved[:, int(name[1]) - 1]
-        return out

@@ -109,54 +109,37 @@ class SectionTurn(Turn):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Director(Body):
-    """The director Λ x, seen along the turned axes: x is what it is in the undeformed beam."""
-
-    turn: SectionTurn
-    is_position: bool = False
-
-    def rate(self, k: Kinematics) -> Any:
-        """Return ω×x."""
-        return self.turn.rate(k, self.x)
-
-    def second_rate(self, k: Kinematics) -> Any:
-        """Return ω̇×x + ω×(ω×x)."""
-        return self.turn.second_rate(k, self.x)
-
-    def variation(self, k: Kinematics) -> Any:
-        """Return (T δθ)×x."""
-        return self.turn.variation(k, self.x)
-
-    def resolve(self, v: Any) -> Any:
-        """Return Λᵀ v."""
-        return self.turn.rotate_back(v)
-
-
-@dataclass(frozen=True, kw_only=True)
-class OffsetMass(Body):
-    """A mass at x = r + Λ d: beside the axis r, fixed in the section.
+class SectionBody(Body):
+    """What is fixed in a section: a director Λ d, seen along the turned axes, or a mass at r + Λ d beside the axis.
 
     Attributes:
-        axis: r, an expression of q.
-        arm: d, what the offset is in the undeformed beam.
+        arm: d, what the director or the offset is in the undeformed beam.
         turn: Λ.
+        axis: r, an expression of q; None of a director.
     """
 
-    axis: Any
     arm: Any
     turn: SectionTurn
+    axis: Any = None
 
     def rate(self, k: Kinematics) -> Any:
-        """Return ṙ + Λ (ω×d)."""
-        return k.rate(self.axis) + self.turn.rotate(self.turn.rate(k, self.arm))
+        """Return ω×d, or ṙ + Λ (ω×d)."""
+        return self._moved(k.rate, self.turn.rate(k, self.arm))
 
     def second_rate(self, k: Kinematics) -> Any:
-        """Return r̈ + Λ (ω̇×d + ω×(ω×d))."""
-        return k.second_rate(self.axis) + self.turn.rotate(self.turn.second_rate(k, self.arm))
+        """Return ω̇×d + ω×(ω×d), or r̈ + Λ times it."""
+        return self._moved(k.second_rate, self.turn.second_rate(k, self.arm))
 
     def variation(self, k: Kinematics) -> Any:
-        """Return δr + Λ (T δθ×d)."""
-        return k.variation(self.axis) + self.turn.rotate(self.turn.variation(k, self.arm))
+        """Return T δθ×d, or δr + Λ (T δθ×d)."""
+        return self._moved(k.variation, self.turn.variation(k, self.arm))
+
+    def _moved(self, change: Callable[[Any], Any], of_arm: Any) -> Any:
+        return of_arm if self.axis is None else change(self.axis) + self.turn.rotate(of_arm)
+
+    def resolve(self, v: Any) -> Any:
+        """Return Λᵀ v of a director, v of a mass."""
+        return self.turn.rotate_back(v) if self.axis is None else v
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -399,10 +382,11 @@ class SpatialBeam(Beam):
             return Body(r, density, measure, effect=effect)
         arm = self._from_triad(center)
         x = r + self._turn.rotate(arm)
-        return OffsetMass(x, density, measure, effect=effect, axis=r, arm=arm, turn=self._turn)
+        return SectionBody(x, density, measure, effect=effect, axis=r, arm=arm, turn=self._turn)
 
     def _director(self, axis: tuple[Any, ...], density: Any, measure: Any, effect: str) -> Body:
-        return Director(self._from_triad(axis), density, measure, effect=effect, turn=self._turn)
+        d = self._from_triad(axis)
+        return SectionBody(d, density, measure, False, effect, arm=d, turn=self._turn)
 
     def _tip_bodies(self) -> list[Body]:
         """Return the mass at the tip and those along the beam, and their directors."""

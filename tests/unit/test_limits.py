@@ -15,7 +15,7 @@ import rotfem
 from rotfem.errors import InputError, Problem, SceneError, printable, show
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.files import DEEPEST, Unreadable, read_bytes
-from rotfem.structures.memory import check_memory
+from rotfem.structures.structure import check_memory
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
 TABLES: dict[str, Any] = {

@@ -12,9 +12,8 @@ from rotfem.errors import ComputationError
 from rotfem.numerics import linear
 from rotfem.numerics.eigenproblem import mirror_error
 from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular, symmetric
-from rotfem.numerics.low_rank import LowRank, PlusLowRank
 from rotfem.numerics.newton import Newton, OldFactor
-from rotfem.numerics.projection import times
+from rotfem.numerics.projection import LowRank, PlusLowRank, times
 
 
 class Scalar:
