@@ -18,10 +18,10 @@ from petsc4py import PETSc
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.numerics.damped import heavily_damped, quadratic
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
 from rotfem.numerics.projection import orthonormal, summed, times
+from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
 

@@ -21,9 +21,9 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.errors import InputError
-from rotfem.numerics.damped import MORE
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.projection import LowRank, summed, times
+from rotfem.numerics.ritz import MORE
 
 Array = npt.NDArray[np.float64]
 

@@ -31,10 +31,9 @@ from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
-from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
-from rotfem.numerics.gyroscopic import gyroscopic_pairs
 from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
 from rotfem.numerics.projection import Sendable, sparse_part, summed, times
+from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
 
 class RoundOff:
@@ -347,7 +346,7 @@ class Pencil(Sendable):
         return self.asymmetries["C"] > 1e-10
 
     def _damped(self, count: int, target: float) -> Eigenpairs:
-        """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.damped`)."""
+        """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.ritz`)."""
         C = sparse_part(self.C)  # what it has of low rank is symmetric
         gyroscopic = transposed(C)
         gyroscopic.aypx(-1.0, C)
