@@ -9,8 +9,27 @@ from typing import Any, ClassVar
 import ufl
 
 
+class Moved:
+    """What work is done on: x, an expression of q."""
+
+    x: Any
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return δx."""
+        return k.variation(self.x)
+
+    def rigid_turn(self, e: Any) -> Any:
+        """Return the change of x in a unit rigid turn about the axis e: e×x of a vector, 1 of an angle about e."""
+        e = self.resolve(e)
+        return ufl.cross(e, self.x) if ufl.as_ufl(self.x).ufl_shape else e[2]
+
+    def resolve(self, v: Any) -> Any:
+        """Return a vector of the frame in the axes that x and its rates are given in, here those of the frame."""
+        return v
+
+
 @dataclass(frozen=True)
-class Body:
+class Body(Moved):
     """Mass that a material vector carries.
 
     Attributes:
@@ -34,18 +53,6 @@ class Body:
     def second_rate(self, k: Kinematics) -> Any:
         """Return ẍ relative to the frame."""
         return k.second_rate(self.x)
-
-    def variation(self, k: Kinematics) -> Any:
-        """Return δx."""
-        return k.variation(self.x)
-
-    def rigid_turn(self, e: Any) -> Any:
-        """Return the change of x in a unit rigid turn about the axis e, e×x."""
-        return ufl.cross(self.resolve(e), self.x)
-
-    def resolve(self, v: Any) -> Any:
-        """Return a vector of the frame in the axes that x and its rates are given in, here those of the frame."""
-        return v
 
 
 @dataclass(frozen=True)
@@ -105,7 +112,7 @@ class Strain:
 
 
 @dataclass(frozen=True)
-class AppliedLoad:
+class AppliedLoad(Moved):
     """A force (or moment) on a position (or angle) x(q).
 
     Attributes:
@@ -123,14 +130,6 @@ class AppliedLoad:
     dead: bool = True
     #: Whether −force·x is a potential of it, where it is dead.
     conservative: ClassVar[bool] = True
-
-    def variation(self, k: Kinematics) -> Any:
-        """Return what the force works on in a variation of q, δx."""
-        return k.variation(self.x)
-
-    def rigid_turn(self, e: Any) -> Any:
-        """Return the change of x in a unit rigid turn about the axis e: e×x of a position, 1 of an angle about e."""
-        return ufl.cross(e, self.x) if ufl.as_ufl(self.x).ufl_shape else e[2]
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ class RootSpring:
 
 
 @dataclass(frozen=True)
-class Support:
+class Support(Moved):
     """A spring and a damper between a section of a shaft and the fixed frame, the same in all directions across it.
 
     Attributes:
@@ -171,14 +170,6 @@ class Support:
     damping: tuple[Any, Any]
     axis: Any
     measure: Any
-
-    def variation(self, k: Kinematics) -> Any:
-        """Return δx."""
-        return k.variation(self.x)
-
-    def rigid_turn(self, e: Any) -> Any:
-        """Return the change of x in a unit rigid turn about the axis e, e×x."""
-        return ufl.cross(e, self.x)
 
     def times(self, coefficients: tuple[Any, Any], v: Any) -> Any:
         """Return [[a, b], [−b, a]] v of a vector across the axis, a v − b e×v."""

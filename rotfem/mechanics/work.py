@@ -19,7 +19,7 @@ from typing import Any
 import ufl
 from ufl import cross
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Moved, RootSpring, Strain
 from rotfem.mechanics.frame import Frame
 from rotfem.numerics.forms import added
 from rotfem.registry import damping_models, resolved
@@ -32,7 +32,7 @@ class Variation:
     k: Kinematics
     within_frame = True
 
-    def of(self, moving: Body | AppliedLoad | Support) -> Any:
+    def of(self, moving: Moved) -> Any:
         """Return δx of a body, or of what a load works on."""
         return moving.variation(self.k)
 
@@ -44,7 +44,7 @@ class RigidTurn:
     e: Any
     within_frame = False
 
-    def of(self, moving: Body | AppliedLoad | Support) -> Any:
+    def of(self, moving: Moved) -> Any:
         """Return e×x of a body, or of what a load works on."""
         return moving.rigid_turn(self.e)
 

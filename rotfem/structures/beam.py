@@ -77,11 +77,6 @@ class Beam(Structure):
         self.clamped = fem.locate_dofs_topological(self.V, 0, facets[1])
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
-    @property
-    def hinges(self) -> dict[int, Any]:
-        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
-        return getattr(self.data, "hinges", {})
-
     def root_turn(self, axis: int) -> Any:
         """Return the rotation at the root about an axis, 1 to 3, of the blade there: an expression, rad."""
         raise NotImplementedError

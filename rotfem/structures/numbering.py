@@ -50,18 +50,18 @@ class Numbering:
 
         With a free hub one more entry, the same on all processes, may follow the unknowns.
         """
-        counts = {"nodes": len(self._nodes), "cells": len(self._cells)}
-        unknowns = self.size * counts["nodes"]
-        counts = {"unknowns": unknowns, "unknowns and hub": unknowns + 1, **counts}
+        counts = self._counts(len(self._nodes), len(self._cells))
         here = [name for name, count in counts.items() if len(x) == count]
         everywhere = set(here).intersection(*self.comm.allgather(here))
         return next((name for name in counts if name in everywhere), "")
 
     def count(self, kind: str) -> int:
         """Return the length of the first axis of an array in the common order; -1 if there is no such kind."""
-        unknowns: int = self.size * self._all_nodes
-        counts = {"nodes": self._all_nodes, "cells": self._all_cells}
-        return {"unknowns": unknowns, "unknowns and hub": unknowns + 1, **counts}.get(kind, -1)
+        return self._counts(self._all_nodes, self._all_cells).get(kind, -1)
+
+    def _counts(self, nodes: int, cells: int) -> dict[str, int]:
+        unknowns = self.size * nodes
+        return {"unknowns": unknowns, "unknowns and hub": unknowns + 1, "nodes": nodes, "cells": cells}
 
     def gather(self, x: Array, kind: str) -> Array | None:
         """Return a local array of a kind (see `kind`), ghosts after its own, in the common order, on rank 0."""

@@ -230,8 +230,8 @@ class Structure:
 
     @property
     def hinges(self) -> dict[int, Any]:
-        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it; none here."""
-        return {}
+        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
+        return getattr(self.data, "hinges", {})
 
     def springs(self) -> list[RootSpring]:
         """Return what holds the hinges; none here."""
