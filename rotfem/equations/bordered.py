@@ -84,18 +84,13 @@ class HubRow:
 
     def torque(self, t: float, after: bool = False) -> float:
         """Return M at time t (s) and the state, N·m; after a jump there if so wanted."""
-        return self.hub.torque.on(t, self._seen, after)
+        return self.hub.torque.on(t, self.seen, after)
 
-    def _seen(self) -> tuple[float, float, dict[str, float]]:
+    def seen(self) -> tuple[float, float, dict[str, float]]:
         """Return psi (rad), psi' (rad/s) and the tip at the state, by the names of its components."""
         system, (psi, speed, _) = self.system, self.angle.values
         tip = system.tip(system.q.x.array, system.time)
         return float(psi), float(speed), dict(zip(system.structure.components, map(float, tip), strict=True))
-
-    def torque_slope(self, c_k: float, c_v: float) -> float:
-        """Return −∂M/∂psi c_k − ∂M/∂psi' c_v of a torque that answers to the motion; 0 of others."""
-        by_angle, by_speed = self.hub.torque.slopes(self.system.time, self._seen)
-        return -c_k * by_angle - c_v * by_speed
 
     def work(self) -> float:
         """Return the work of the structure in the rigid turn, N·m."""
@@ -164,7 +159,6 @@ class BorderedSystem:
         self.angle = self.row.angle
         self.hub = self.row.hub
         self._dz = Increment(inner.V)
-        self._whole: OverStep | None = None
 
     def __getattr__(self, name: str) -> Any:
         if name == "inner":
@@ -174,7 +168,7 @@ class BorderedSystem:
     def twin(self) -> Self:
         """Return another system of the same forms (see `System.twin`)."""
         other = copy(self)
-        other.inner, other._whole = self.inner.twin(), None
+        other.inner = self.inner.twin()
         other._row = self.inner.compilations, copy(self.row)
         other._row[1].system = other.inner
         return other
@@ -226,10 +220,8 @@ class BorderedSystem:
 
     @property
     def balance(self) -> OverStep:
-        """The equations over a whole step, made anew where the structure's were."""
-        if self._whole is None or self._whole.inner is not self.inner.balance:
-            self._whole = OverStep(self)
-        return self._whole
+        """The equations over a whole step."""
+        return OverStep(self)
 
     # --- solutions ---------------------------------------------------------------------------------------------------
 
@@ -240,7 +232,8 @@ class BorderedSystem:
         R = s.residual()
         A, changed = s.tangent(*shifts, None if before is None else before[:-1])
         b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
-        r, d = -row.residual(s.time), row.diagonal(c_v, c_m) + row.torque_slope(c_k, c_v)
+        by_angle, by_speed = self.hub.torque.slopes(s.time, row.seen)
+        r, d = -row.residual(s.time), row.diagonal(c_v, c_m) - c_k * by_angle - c_v * by_speed
         assembled_at = perf_counter()
         out = self._eliminated(s.factor(A, changed), (R, b), c, r, d)
         s.seconds["assemble"] += assembled_at - started
@@ -276,14 +269,9 @@ class BorderedSystem:
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""
         out = []
-        for A, shifts, factors in zip(
-            matrices,
-            ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),
-            ((0.0, 1.0), (1.0, 0.0), (0.0, 0.0)),
-            strict=True,
-        ):
-            row, column = self.row.row(shifts).array.copy(), self.inner.spin_derivative(*factors).array.copy()
-            out.append(bordered(A, row, column, self.row.diagonal(*factors)))
+        for A, shifts in zip(matrices, ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)), strict=True):
+            row, column = self.row.row(shifts).array.copy(), self.inner.spin_derivative(*shifts[1:]).array.copy()
+            out.append(bordered(A, row, column, self.row.diagonal(*shifts[1:])))
         return out[0], out[1], out[2]
 
     # --- what is read of a state -------------------------------------------------------------------------------------

@@ -107,7 +107,13 @@ class Model:
 
     def compose(self) -> None:
         """Write the mechanics and the terms, or write them anew where the structure counts its rotations otherwise."""
-        self.mechanics: Mechanics = self._mechanics()
+        s, theory = self.structure, self.theory
+        bodies = [
+            replace(b, density=self._switched(b.effect or "structure", bool(b.effect), b.density))
+            for b in s.bodies(self.effects)
+        ]
+        strains = self.strains(theory.measures(s.type), first_order=theory.linear)
+        self.mechanics = Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
         self.terms = self.work(Variation(self.structure.k))
         self.residual = added(self.terms.values())
         self._stretch: Any = None
@@ -149,15 +155,6 @@ class Model:
     def fixed(self) -> bool:
         """Whether the frame does not rotate."""
         return self.frame.fixed
-
-    def _mechanics(self) -> Mechanics:
-        s, theory = self.structure, self.theory
-        bodies = [
-            replace(b, density=self._switched(b.effect or "structure", bool(b.effect), b.density))
-            for b in s.bodies(self.effects)
-        ]
-        strains = self.strains(theory.measures(s.type), first_order=theory.linear)
-        return Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
 
     def strains(self, measures: Callable[..., tuple[Any, ...]], first_order: bool = False) -> list[Strain]:
         """Return the strains of a theory's measures, of first order in q or whole, with the effects' gains."""

@@ -199,11 +199,8 @@ class Linearised:
 
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
-        return self._solve_real(real), self._local(self._complex.solve(complex_))
-
-    def _solve_real(self, r: Array) -> Array:
-        self._b.array[:] = r
-        return self._part.solve(self._real, self._b).copy()
+        self._b.array[:] = real
+        return self._part.solve(self._real, self._b).copy(), self._local(self._complex.solve(complex_))
 
     def _local(self, owned: Array) -> Array:
         """Return an owned complex array with the ghosts of other ranks."""

@@ -113,7 +113,7 @@ class Structure:
     Attributes:
         mesh, V, k: mesh, space of the unknowns, and the unknowns with their rates.
         dx, dx_elastic: measures of full integration, and of that which keeps locking away.
-        tip: measure of the end of the structure that tip forces work on; tip_size is its extent (m, or 1 of a point).
+        tip: measure of the end of the structure that tip forces work on.
         root: measure of the clamped end.
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
