@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
@@ -103,10 +103,15 @@ class BeamStructure(StructureTable):
     masses: tuple[PointMass, ...] = ()
     damping: Damping = Damping()
 
+    if TYPE_CHECKING:
+        section: PlanarSection | SpatialSection
+        root: Root
+        tip_inertia: float | Matrix
+
     @property
     def knots(self) -> tuple[float, ...]:
         """Places (m) of all rows of tables between the ends, and of masses, increasing."""
-        return apart({*self._section.breakpoints, *self.nodes}, self.length)
+        return apart({*self.section.knots, *self.nodes}, self.length)
 
     @property
     def nodes(self) -> tuple[float, ...]:
@@ -116,36 +121,26 @@ class BeamStructure(StructureTable):
     @property
     def hinges(self) -> dict[int, Hinge]:
         """Axis ↦ the hinge about it at the root."""
-        return self._root.hinges
+        return self.root.hinges
 
     @property
     def pitches(self) -> bool:
         """Whether its pitch changes with time."""
-        return isinstance(self._root, SpatialRoot) and self._root.pitch.changes
-
-    @property
-    def _root(self) -> Root:
-        root: Root = vars(self)["root"]
-        return root
+        return isinstance(self.root, SpatialRoot) and self.root.pitch.changes
 
     @property
     def has_tip_mass(self) -> bool:
         """Whether there is anything at the tip, or at another point, that has inertia."""
-        return self.tip_mass > 0.0 or bool(np.any(_as_matrix(vars(self)["tip_inertia"]))) or bool(self.masses)
+        return self.tip_mass > 0.0 or bool(np.any(_as_matrix(self.tip_inertia))) or bool(self.masses)
 
     @property
     def has_rotary_inertia(self) -> bool:
         """Whether the sections have rotary inertia."""
-        return self._section.has_rotary_inertia
-
-    @property
-    def _section(self) -> PlanarSection | SpatialSection:
-        section: PlanarSection | SpatialSection = vars(self)["section"]
-        return section
+        return self.section.has_rotary_inertia
 
     def _check_tables(self, slack: float = ROUND_OFF) -> None:
         """Refuse tapers of the section that end elsewhere, properties of a size that cannot be, masses elsewhere."""
-        section = self._section
+        section = self.section
         for name, taper in section.tapers.items():
             check_profile_length(f"section.{name}", taper, self.length, slack)
         if section.way.name != "matrix":
@@ -171,15 +166,11 @@ class PlanarBeamStructure(BeamStructure):
         root: hinge, spring and damper at the clamp.
     """
 
+    is_planar: ClassVar[bool] = True
     type: Literal["planar_beam"] = "planar_beam"
     tip_inertia: Annotated[NonNegative, Unit("kg*m**2")] = 0.0
     root: Root = Root()
     section: PlanarSection = Field(description="a table of section properties")
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether it moves in the plane (1, 2) of the frame only: it does."""
-        return True
 
     @property
     def root_position(self) -> tuple[float, float, float]:

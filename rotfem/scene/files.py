@@ -7,7 +7,7 @@ import os
 import re
 import select
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -127,24 +127,24 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
     return key, parsed["value"] if set(parsed) == {"value"} else text
 
 
-def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """Return a copy of nested tables with one dotted key set, or removed if the value is None.
+def set_keys(file: str, data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a copy of nested tables with dotted keys set, one after the other, or removed if the value is None.
 
-    Missing tables on the way are created; raise a SceneError of the file where a part of the path is not a table.
+    Missing tables on the way are created; raise a SceneError of the file where a part of a path is not a table.
     """
-    *parents, last = key.split(".")
-    result = table = dict(data)
-    for depth, parent in enumerate(parents, start=1):
-        below = table.get(parent, {})
-        if not isinstance(below, Mapping):
-            raise SceneError(file, ".".join(parents[:depth]), below, f"is not a table, so {key} cannot be set")
-        table[parent] = dict(below)
-        table = table[parent]
-    if value is None:
-        table.pop(last, None)
-    else:
-        table[last] = value
-    return result
+    for key, value in changes:
+        *parents, last = key.split(".")
+        data = table = dict(data)
+        for depth, parent in enumerate(parents, start=1):
+            below = table.get(parent, {})
+            if not isinstance(below, Mapping):
+                raise SceneError(file, ".".join(parents[:depth]), below, f"is not a table, so {key} cannot be set")
+            table[parent] = table = dict(below)
+        if value is None:
+            table.pop(last, None)
+        else:
+            table[last] = value
+    return data
 
 
 def encodable(text: str) -> str:
@@ -172,9 +172,7 @@ def to_builtin(file: str, key: str, value: Any, depth: int = 0) -> Any:
 
 def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
     """Return a copy of the scene's tables with overrides (see `parse_override`) applied in order."""
-    for override in overrides:
-        data = set_key(file, data, *parse_override(file, override))
-    return data
+    return set_keys(file, data, [parse_override(file, override) for override in overrides])
 
 
 #: Bytes of a table, at most, for each row that it may have: a row may have a 6×6 matrix in it.

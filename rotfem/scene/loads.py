@@ -9,14 +9,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.errors import SceneError
 from rotfem.scene.motion import Motion
 from rotfem.scene.signals import FORCE, MOMENT, PRESSURE, Harmonic, Kind, Signal, arguments
 from rotfem.scene.span_tables import is_path
 from rotfem.scene.table import SceneModel, Unit, problem
 from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, as_number, as_vector
-
-#: How tables are written that are not mistaken for others.
-KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
 class Load(Signal):
@@ -285,21 +283,19 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
         raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
 
 
-def doubtful_table(structure: Any, loads: Loads, when: str) -> tuple[str, str] | None:
-    """Return (key, what is wrong) of a table without a key that may be over the span; None if there is none.
+def check_tables(file: str, structure: Any, loads: Loads, when: str) -> None:
+    """Refuse, with a SceneError of the file, tables without a key that may be over the span (see `Scene.check_tables`).
 
-    Args:
-        structure: of the scene.
-        loads: on it.
-        when: what is computed at one time, as "a steady state"; "" for a history, where such a table is over time
-            unless it runs from 0 to the length.
+    In a history such a table is over time unless it runs from 0 to the length.
     """
     for name, load in loads.named.items():
         if not isinstance(load, SpanLoad) or load.table is None:
             continue
+        why = None
         if when:
-            return f"loads.{name}", f"is a table [[t, …], …] over time, which {when} does not have; {KEYS}"
-        if load.table[0][0] == 0.0 and load.table[-1][0] == structure.length:
-            what = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
-            return f"loads.{name}", f"{what}; {KEYS}"
-    return None
+            why = f"is a table [[t, …], …] over time, which {when} does not have"
+        elif load.table[0][0] == 0.0 and load.table[-1][0] == structure.length:
+            why = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
+        if why is not None:
+            how = "over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
+            raise SceneError(file, f"loads.{name}", None, f"{why}; write {how}")

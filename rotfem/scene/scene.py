@@ -18,8 +18,8 @@ from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, encodable, noted_files, read_toml, set_key, to_builtin
-from rotfem.scene.loads import Loads, check_loads, doubtful_table
+from rotfem.scene.files import apply_overrides, encodable, noted_files, read_toml, set_keys, to_builtin
+from rotfem.scene.loads import Loads, check_loads, check_tables
 from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.structure import designed
@@ -181,9 +181,7 @@ class Scene(SceneModel):
         Raises:
             SceneError: the result is not valid.
         """
-        tables = self._tables
-        for key, value in changes.items():
-            tables = set_key(self._file, tables, key, value)
+        tables = set_keys(self._file, self._tables, changes.items())
         variant = type(self)._validate(tables, self._name, self._file, self._directory)
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
         return variant
@@ -235,8 +233,7 @@ class Scene(SceneModel):
         Raises:
             SceneError: there is one.
         """
-        if (found := doubtful_table(self.structure, self.loads, when)) is not None:
-            raise SceneError(self._file, found[0], None, found[1])
+        check_tables(self._file, self.structure, self.loads, when)
 
     @model_validator(mode="before")
     @classmethod

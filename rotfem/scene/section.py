@@ -96,11 +96,6 @@ class Section(SceneModel):
         return choose_way(self.given, (*self.WAYS, *shapes))
 
     @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """Interior knots of all tapers (m), increasing; a mesh should have a node at each."""
-        return tuple(sorted({x for taper in self.tapers.values() for x, _ in taper[1:-1]}))
-
-    @property
     def uniform(self) -> bool:
         """Whether all properties are the same along the beam."""
         return all(len({value for _, value in taper}) == 1 for taper in self.tapers.values())
@@ -332,16 +327,13 @@ class SpatialSection(Section):
         if self.stiffness is not None and self.mass is not None:
             return {"stiffness": evaluate(self.stiffness, x), "mass": evaluate(self.mass, x)}
         central = self.central(x)
-        stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
+        stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)[..., None] * np.eye(6)
         m, J2, J3 = (central[key] for key in _INERTIAS)
-        mass_center = self.center("mass_center", x)
-        turned = np.swapaxes(about_axis(self.profile("principal_angle", x)), -1, -2)
-        B = turned @ shifted(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
-        B_mass = turned @ shifted(axial=mass_center, transverse=mass_center)
-        masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
+        angle, mass_center = self.profile("principal_angle", x), self.center("mass_center", x)
+        tension_center, shear_center = self.center("tension_center", x), self.center("shear_center", x)
         return {
-            "stiffness": np.swapaxes(B, -1, -2) @ (stiffnesses[..., None] * B),
-            "mass": np.swapaxes(B_mass, -1, -2) @ (masses[..., None] * B_mass),
+            "stiffness": about_reference(stiffnesses, tension_center, shear_center, angle),
+            "mass": mass_matrices(m, J2, J3, mass_center, angle),
         }
 
     def central(self, x: npt.ArrayLike) -> dict[str, Array]:
@@ -381,6 +373,25 @@ def about_axis(angle: npt.ArrayLike) -> Array:
     for i in (1, 4):
         R[..., i, i], R[..., i, i + 1], R[..., i + 1, i], R[..., i + 1, i + 1] = c, -s, s, c
     return R
+
+
+def mass_matrices(m: Array, J2: Array, J3: Array, center: npt.ArrayLike, angle: npt.ArrayLike) -> Array:
+    """Return mass matrices (…, 6, 6) about the reference axis, of masses and rotary inertias about their centres."""
+    central = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)[..., None] * np.eye(6)
+    return about_reference(central, center, center, angle)
+
+
+def about_reference(matrix: Array, axial: npt.ArrayLike, transverse: npt.ArrayLike, angle: npt.ArrayLike) -> Array:
+    """Return Bᵀ M B (…, 6, 6) along section axes about the reference axis, of M along turned axes and about centres.
+
+    Args:
+        matrix: M.
+        axial: centre (y, z) that axial strain and bending are about, (…, 2) in m.
+        transverse: centre that shear and twist are about.
+        angle: of the turn about axis 1 from the section axes (rad).
+    """
+    B = np.swapaxes(about_axis(angle), -1, -2) @ shifted(axial, transverse)
+    return np.asarray(np.swapaxes(B, -1, -2) @ matrix @ B)
 
 
 def shifted(axial: npt.ArrayLike, transverse: npt.ArrayLike) -> Array:

@@ -19,12 +19,14 @@ from pydantic_core import CoreSchema, core_schema
 from rotfem.scene.files import as_table, read_header, read_rows, table_text
 from rotfem.scene.table import did_you_mean, problem, problems_at
 from rotfem.scene.values import (
+    UPPER,
     Bounds,
     Matrix,
     Profile,
     as_number,
     as_symmetric_matrix,
     as_vector,
+    symmetric_matrices,
 )
 
 # --- of points and matrices of a section ------------------------------------------------------------------------------
@@ -125,12 +127,7 @@ AnyProfile = Annotated[Profile, PlainValidator(Bounds().profile), OF_FILE]
 
 def _matrix(entries: Sequence[float]) -> list[list[float]]:
     """Return a matrix (6, 6) of its 36 entries, or of the 21 of its upper triangle."""
-    if len(entries) == 36:
-        M = np.reshape(entries, (6, 6))
-    else:
-        M = np.zeros((6, 6))
-        M[np.triu_indices(6)] = entries
-        M += np.triu(M, 1).T
+    M = np.reshape(entries, (6, 6)) if len(entries) == 36 else symmetric_matrices(entries)
     return [list(map(float, row)) for row in M]
 
 
@@ -148,7 +145,7 @@ def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
     x, column = table[:, 0].tolist(), dict(zip(names, table.T, strict=True))
     del column["x"]
     out: dict[str, Any] = {}
-    entries = {key: [f"{key}_{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)] for key in MATRICES}
+    entries = {key: [f"{key}_{place}" for place in UPPER] for key in MATRICES}
     entries |= {key: [f"{key}_y", f"{key}_z"] for key in POINTS}
     for key, parts in entries.items():
         given = {name: column.pop(name) for name in parts if name in column}

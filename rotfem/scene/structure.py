@@ -181,10 +181,8 @@ def apart(places: Collection[float], length: float) -> tuple[float, ...]:
 class StructureTable(SceneModel):
     """The [structure] table."""
 
-    @property
-    def is_planar(self) -> bool:
-        """Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only."""
-        return False
+    #: Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only.
+    is_planar: ClassVar[bool] = False
 
     @property
     def knots(self) -> tuple[float, ...]:

@@ -240,6 +240,19 @@ def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
     return rows
 
 
+#: Rows and columns of the entries of the upper triangle of a 6×6 matrix, row by row, in names.
+UPPER = tuple(f"{i}{j}" for i in range(1, 7) for j in range(i, 7))
+
+
+def symmetric_matrices(upper: npt.ArrayLike) -> Array:
+    """Return symmetric matrices (…, 6, 6) of their upper triangles (…, 21), row by row."""
+    entries = np.asarray(upper, dtype=np.float64)
+    i, j = np.triu_indices(6)
+    M = np.zeros((*entries.shape[:-1], 6, 6))
+    M[..., i, j] = M[..., j, i] = entries
+    return M
+
+
 def is_table(value: object) -> bool:
     """Return whether a validated value is a table over the span, not one number, point or matrix for all of it."""
     return isinstance(value, tuple) and isinstance(value[0], tuple) and len(value[0]) == 2

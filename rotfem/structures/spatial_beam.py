@@ -221,7 +221,7 @@ class SpatialBeam(Beam):
         rigid = [(data.tip_offset, data.tip_inertia_matrix), *((m.offset, m.inertia_matrix) for m in data.masses)]
         if any(offset[normal] != 0.0 or np.any(np.delete(J[normal], normal)) for offset, J in rigid):
             return False
-        knots = np.array([0.0, *data.section.breakpoints, data.length])
+        knots = np.union1d(data.section.knots, data.length)
         places = np.union1d(knots, (knots[1:] + knots[:-1]) / 2)
         across = np.arange(3) == normal
         mirrored = np.concatenate([across, ~across])

@@ -233,8 +233,7 @@ class SectionForms:
     @cached_property
     def _coupled(self) -> bool:
         """Whether a full matrix couples twist with stretch anywhere."""
-        places = [0.0, *self._data.breakpoints, self._beam.length]
-        return self._data.stiffness is not None and bool(np.any(self._data.at(places)["stiffness"][:, 0, 3]))
+        return self._data.stiffness is not None and bool(np.any(self._data.at(self._data.knots)["stiffness"][:, 0, 3]))
 
     @cached_property
     def _warping(self) -> Any:

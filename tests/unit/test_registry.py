@@ -328,7 +328,7 @@ def test_dimensions_of_a_shape_of_ones_own_may_be_tapers(add: Add) -> None:
     add(ELLIPSE)
     asked = scene(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [0.5, 0.2], [2, 0.2]]}))
     section: Any = asked.structure.section  # type: ignore[union-attr]
-    assert (section.breakpoints, section.uniform) == ((0.5,), False)
+    assert (section.knots[1:-1], section.uniform) == ([0.5], False)
     np.testing.assert_allclose(section.at(0.25)["EI"], 210e9 * np.pi * 0.2 * 0.15**3 / 4)
     assert asked.to_dict()["structure"]["section"]["semi_axis_3"] == [[0.0, 0.1], [0.5, 0.2], [2.0, 0.2]]
     assert "it ends at 1" in refusal(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [1, 0.2]]}))

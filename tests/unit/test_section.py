@@ -36,7 +36,7 @@ def spatial(**section: Any) -> SpatialSection:
 def test_stiffness_way_returns_what_was_given() -> None:
     section = planar(EA=1, GA=2, EI=3, mass_per_length=4, rotary_inertia=5)
     assert section.uniform
-    assert section.breakpoints == ()
+    assert section.knots == [0.0]
     values = section.at(X)
     assert list(values) == ["EA", "GA", "EI", "mass_per_length", "rotary_inertia"]
     for value, expected in zip(values.values(), (1, 2, 3, 4, 5), strict=True):
@@ -91,7 +91,7 @@ def test_shapes(shape: dict[str, Any], area: float, second_moment: float, correc
 def test_taper_interpolates_dimensions_before_properties() -> None:
     section = planar(**MATERIAL, shape="rectangle", width=0.1, height=[[0.0, 0.2], [0.5, 0.15], [2.0, 0.1]])
     assert not section.uniform
-    assert section.breakpoints == (0.5,)
+    assert section.knots[1:-1] == [0.5]
     height = np.array([0.2, 0.15, 0.1])
     np.testing.assert_allclose(section.at(X)["EI"], 210e9 * 0.1 * height**3 / 12)
     np.testing.assert_allclose(section.at(1.25)["EI"], 210e9 * 0.1 * 0.125**3 / 12)
@@ -266,7 +266,7 @@ def test_spatial_material_way() -> None:
 
 def test_spatial_taper() -> None:
     section = spatial(**{**SPATIAL, "EI2": [[0, 8], [1, 4], [2, 2]]})
-    assert section.breakpoints == (1.0,)
+    assert section.knots[1:-1] == [1.0]
     np.testing.assert_allclose(section.at(X)["stiffness"][:, 4, 4], [8, 6, 2])
 
 

@@ -27,9 +27,9 @@ from rotfem.registry import register
 from rotfem.scene.blades.axes import FROM_HAWC2, line_of, rows_over, turned_matrix
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, find_file
 from rotfem.scene.files import DEEPEST
-from rotfem.scene.section import about_axis, shifted
+from rotfem.scene.section import about_reference, mass_matrices
 from rotfem.scene.table import problem
-from rotfem.scene.values import DIGITS, Array, is_positive
+from rotfem.scene.values import DIGITS, UPPER, Array, is_positive, symmetric_matrices
 
 #: Columns of a row with centres, and with a full matrix.
 CENTRES = [
@@ -37,7 +37,7 @@ CENTRES = [
     *("k_x", "k_y", "A", "pitch", "x_e", "y_e"),
 ]
 FULL = ["r", "m", "x_cg", "y_cg", "ri_x", "ri_y", "pitch", "x_e", "y_e"]
-FULL += [f"K{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
+FULL += [f"K{place}" for place in UPPER]
 
 #: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
 POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
@@ -132,8 +132,8 @@ def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array
         deck.fail(f"has {columns} columns; must be {allowed}" + ("" if full is None else f", as FPM {full:d}"), first)
     table = deck.table(first, count, known[columns], POSITIVE)
     deck.increasing(table["r"], first, what="r")
-    for i in range(count) if "K11" in table else ():
-        if not is_positive(_stiffness({name: values[i] for name, values in table.items()})):
+    for i, matrix in enumerate(_matrices(table)["stiffness"] if "K11" in table else ()):
+        if not is_positive(matrix):
             deck.fail("the stiffness matrix is not positive definite", first + i)
     return table
 
@@ -159,9 +159,7 @@ def _parts(deck: Deck) -> dict[tuple[int, int], tuple[int, int]]:
 def _section(table: dict[str, Array]) -> dict[str, Any]:
     """Return the section of columns: with full matrices, or properties about centres, linear between rows."""
     if "K11" in table:
-        rows = [{name: float(values[i]) for name, values in table.items()} for i in range(len(table["r"]))]
-        matrices = {"stiffness": [_stiffness(row) for row in rows], "mass": [_mass(row) for row in rows]}
-        return {name: rows_over(table["r"], np.array(found)) for name, found in matrices.items()}
+        return {name: rows_over(table["r"], found) for name, found in _matrices(table).items()}
     table = _with_rows_between(table)
     centres = {"mass_center": "cg", "shear_center": "sh", "tension_center": "e"}
     points = {key: np.stack([table[f"x_{at}"], table[f"y_{at}"]], axis=-1) for key, at in centres.items()}
@@ -198,23 +196,13 @@ def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
     return {name: np.interp(places, r, column) for name, column in table.items()} | {"r": places}
 
 
-def _stiffness(row: dict[str, float]) -> Array:
-    """Return the stiffness matrix along our axes about the line of c2_def, of a row with a full one."""
-    K = np.zeros((6, 6))
-    for i, j in zip(*np.triu_indices(6), strict=True):
-        K[i, j] = K[j, i] = row[f"K{i + 1}{j + 1}"]
-    elastic, turn = (row["x_e"], row["y_e"]), about_axis(np.radians(row["pitch"]))
-    B = shifted(elastic, elastic)
-    return np.asarray(B.T @ turn @ turned_matrix(K, FROM_HAWC2) @ turn.T @ B)
-
-
-def _mass(row: dict[str, float]) -> Array:
-    """Return the mass matrix along our axes about the line of c2_def."""
-    m, turn = row["m"], about_axis(np.radians(row["pitch"]))
-    flap, edge = m * row["ri_x"] * row["ri_x"], m * row["ri_y"] * row["ri_y"]
-    center = (row["x_cg"], row["y_cg"])
-    B = shifted(center, center)
-    return np.asarray(B.T @ turn @ np.diag([m, m, m, flap + edge, flap, edge]) @ turn.T @ B)
+def _matrices(table: dict[str, Array]) -> dict[str, Array]:
+    """Return stiffness and mass matrices (n, 6, 6) along our axes about the line of c2_def, of rows with full ones."""
+    K = turned_matrix(symmetric_matrices(np.stack([table[f"K{place}"] for place in UPPER], axis=-1)), FROM_HAWC2)
+    elastic, center = (np.stack([table[f"x_{at}"], table[f"y_{at}"]], axis=-1) for at in ("e", "cg"))
+    m, angle = table["m"], np.radians(table["pitch"])
+    mass = mass_matrices(m, m * table["ri_x"] ** 2, m * table["ri_y"] ** 2, center, angle)
+    return {"stiffness": about_reference(K, elastic, elastic, angle), "mass": mass}
 
 
 # --- main bodies of an htc file ---------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import numpy as np
 from rotfem.registry import register
 from rotfem.scene.blades.axes import FROM_IEC, coned_root, iec_pretwist, line_of, rows_over, scaled_rows, turned_matrix
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
-from rotfem.scene.values import DIGITS, Array, is_positive
+from rotfem.scene.values import DIGITS, UPPER, Array, is_positive, symmetric_matrices
 
 #: Key that later versions have, and those that are known.
 VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
@@ -27,10 +27,8 @@ VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
 #: ten seconds; a blade has some 800 000.
 MOST_YAML = (900_000, 4_500_000)
 
-UPPER = np.triu_indices(6)
-
 #: Elements of a stiffness matrix of version 2, those on the diagonal among them; others are 0 where they are not given.
-ELEMENTS = [f"K{i + 1}{j + 1}" for i, j in zip(*UPPER, strict=True)]
+ELEMENTS = [f"K{place}" for place in UPPER]
 DIAGONAL = [f"K{i}{i}" for i in range(1, 7)]
 
 
@@ -169,10 +167,8 @@ def _column(table: YamlNode, name: str, count: int, needed: bool = True) -> Arra
 
 def _matrices(upper: Array, places: list[YamlNode], definite: bool) -> Array:
     """Return matrices (n, 6, 6) along our axes of upper triangles (n, 21) along x, y, z; refuse what no section has."""
-    out = np.zeros((len(upper), 6, 6))
-    out[:, *UPPER] = upper
+    out = turned_matrix(symmetric_matrices(upper), FROM_IEC)
     for M, place in zip(out, places, strict=True):
-        M[:] = turned_matrix(M + np.triu(M, 1).T, FROM_IEC)
         if not is_positive(M, definite, DIGITS):
             place.fail(
                 "is of a matrix that is not positive definite" + ("; nor may shear stiffness be 0" if definite else "")
