@@ -204,11 +204,13 @@ def result_of(
     (omegas, peaks, undamped), (direct, modal), outputs = asked, answers, found.names
     analysis, spinning = found.analysis, found.spinning
     off, worst = differences(outputs, direct, modal, "tip_"), differences(outputs, direct, modal, "")
-    rows = [
-        row_of(omega, spinning.speed, dict(zip(outputs, zip(d, m, strict=True), strict=True)))
-        | {"difference": float(o), "worst_difference": float(w), "peak": int(peak)}
-        for omega, d, m, o, w, peak in zip(omegas, direct, modal, off, worst, peaks, strict=True)
-    ]
+    rows = list[dict[str, Any]]()
+    for omega, by_factor, by_modes, o, w, peak in zip(omegas, direct, modal, off, worst, peaks, strict=True):
+        row: dict[str, Any] = {"frequency": float(omega), "frequency_hz": float(omega / (2 * np.pi))}
+        row |= {} if spinning.speed == 0.0 else {"per_rev": float(omega / abs(spinning.speed))}
+        for name, d, m in zip(outputs, by_factor, by_modes, strict=True):
+            row |= {name: float(abs(d)), f"{name}_phase": float(np.angle(d)), f"{name}_modal": float(abs(m))}
+        rows.append(row | {"difference": float(o), "worst_difference": float(w), "peak": int(peak)})
     modes = mode_rows(analysis, spinning)
     stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
     warnings = [
@@ -243,16 +245,6 @@ def result_of(
         "advice": [],
     }
     return ResponseResult(summary, rows, direct, modal)
-
-
-def row_of(omega: float, speed: float, outputs: Mapping[str, tuple[complex, complex]]) -> dict[str, Any]:
-    """Return the row of a frequency (rad/s), of name ↦ answers (direct, by modes)."""
-    row: dict[str, Any] = {"frequency": float(omega), "frequency_hz": float(omega / (2 * np.pi))}
-    if speed != 0.0:
-        row["per_rev"] = float(omega / abs(speed))
-    for name, (direct, modal) in outputs.items():
-        row |= {name: float(abs(direct)), f"{name}_phase": float(np.angle(direct)), f"{name}_modal": float(abs(modal))}
-    return row
 
 
 def differences(outputs: Sequence[str], direct: Array, modal: Array, kind: str) -> Array:

@@ -69,23 +69,6 @@ def _real(columns: dict[str, Array]) -> dict[str, Array]:
     return {"x": columns["x"]} | {name: np.real(value / unit) for name, value in values.items()}
 
 
-def _error(row: dict[str, Any]) -> float | None:
-    """Return the relative error of a frequency by mesh and round-off; None where it was not estimated."""
-    mesh = row.get("mesh_error")
-    return None if mesh is None else float(mesh + row["error_bound"])
-
-
-def _of(columns: dict[str, Array], direction: str) -> tuple[Array, Array] | None:
-    """Return displacement and slope (1/m) in a direction; None where the beam has none.
-
-    The rotations of a shape are multiplied by the length of the beam.
-    """
-    for displacement, rotation, sign in DIRECTIONS[direction]:
-        if displacement in columns and rotation in columns:
-            return columns[displacement], sign * columns[rotation] / columns["x"][-1]
-    return None
-
-
 @dataclass(repr=False)
 class ModesResult(Rows):
     """Outcome of `rotfem modes`.
@@ -182,23 +165,22 @@ class ModesResult(Rows):
         Raises:
             InputError: tables over the span are wanted of a plate.
         """
-        shapes: dict[str, Array] = {}
+        shapes, blade_files = dict[str, Array](), dict[str, str]()
+        if self.blade_tables:
+            fitted = self.mode_polynomials()
+            blade_files = {
+                "mode_table.csv": rows_text(self.mode_table()),
+                "mode_polynomials.csv": rows_text(fitted),
+                "elastodyn_modes.dat": elastodyn_lines(fitted),
+            }
         for i, columns in enumerate(self.shapes.values(), start=1):
             shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
         return {
             **({"sensitivities.csv": rows_text(self.sensitivities)} if self.sensitivities else {}),
-            **(self._blade_files() if self.blade_tables else {}),
+            **blade_files,
             "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "mode_shapes.csv": csv_text(shapes),
             "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
-        }
-
-    def _blade_files(self) -> dict[str, str]:
-        fitted = self.mode_polynomials()
-        return {
-            "mode_table.csv": rows_text(self.mode_table()),
-            "mode_polynomials.csv": rows_text(fitted),
-            "elastodyn_modes.dat": elastodyn_lines(fitted),
         }
 
     def _of_beam(self) -> Iterator[tuple[dict[str, Any], dict[str, Array], dict[str, tuple[Array, Array]]]]:
@@ -207,7 +189,12 @@ class ModesResult(Rows):
             raise InputError("structure.type", "plate", "tables over the span are those of beams")
         for row, shape, _ in self.with_shapes():
             columns = _real(shape)
-            found = {name: pair for name in DIRECTIONS if (pair := _of(columns, name)) is not None}
+            found = {  # rotations of a shape are multiplied by the length of the beam
+                name: (columns[u], sign * columns[theta] / columns["x"][-1])
+                for name, kinds in DIRECTIONS.items()
+                for u, theta, sign in kinds
+                if u in columns and theta in columns
+            }
             yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, columns, found
 
     def mode_table(self) -> list[dict[str, Any]]:
@@ -266,13 +253,15 @@ class ModesResult(Rows):
         """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency."""
         unit = ShownUnits.of(self.summary).frequency
         first = unit if unit != "Hz" else "rad/s"  # there is a column of Hz in any case
+        rows = self.rows
+        errors = [None if (e := row.get("mesh_error")) is None else e + row["error_bound"] for row in rows]
         columns = [
-            [str(row["mode"]) for row in self.rows],
-            [row["name"] for row in self.rows],
-            numbers([float(in_unit(row["frequency"], first)) for row in self.rows], 8),
-            numbers([row["frequency_hz"] for row in self.rows], 8),
-            [per_cent(row["damping"]) for row in self.rows],
-            [per_cent(_error(row)) for row in self.rows],
+            [str(row["mode"]) for row in rows],
+            [row["name"] for row in rows],
+            numbers([float(in_unit(row["frequency"], first)) for row in rows], 8),
+            numbers([row["frequency_hz"] for row in rows], 8),
+            [per_cent(row["damping"]) for row in rows],
+            list(map(per_cent, errors)),
         ]
         head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
         return [ShortTable(head, list(zip(*columns, strict=True)))]
