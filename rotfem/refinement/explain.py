@@ -15,7 +15,7 @@ half the cells, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -53,21 +53,6 @@ RESOLVED = 1e-8
 #: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
 #: a sine that is late by a twelfth of its period is as far from itself.
 FAR = 0.5
-
-#: Shortest steps that changes are computed in, relative to the case's own.
-SHORTEST = 0.25
-
-#: Part of a change to which steps are solved: it is shown with two digits.
-DIGITS = 1e-2
-
-#: Largest distance of two tips over the length of the structure: each is displaced by twice the length at most.
-FARTHEST = 4.0
-
-#: How names of modes end that are gone at once, as overdamped ones have two eigenvalues.
-FAST = ", fast"
-
-#: Times at which the speed of a free hub is sampled.
-HUB_SAMPLES = 2001
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +118,7 @@ class Case:
         analysis.past_limits = self.past_limits
         spinning = plainly(system, lambda: analysis.at(speed, self.mode_count))
         names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
-        lasting = [not name.endswith(FAST) for name in names]
+        lasting = [not name.endswith(", fast") for name in names]  # overdamped ones have two eigenvalues
         return np.asarray(spinning.pairs.values[: len(names)][lasting])
 
 
@@ -255,6 +240,8 @@ class Explanation:
         self.effects, kind = problem.effective_effects(), problem.structure.type
         others = sorted((t for t in theories() if t.holds_for(kind)), key=lambda t: t.rank)
         self.problem, self.moving, steps = problem, HISTORY in self.wanted, case.steps
+        self._time: Any = case.steps
+        self._scheme: Any = case.scheme
         self.system = self._compiled(problem, comm, set(self.effects) - set(self.own))
         self.speed, self.failed = self._reached(), dict[str, str]()
         self.scale = self.size = 0.0
@@ -311,7 +298,7 @@ class Explanation:
         hub, end = motion.hub, 0.0 if steps is None else steps.end
         if hub is None or steps is None:
             return motion.final_speed(end)
-        times = np.unique([*np.linspace(0.0, end, HUB_SAMPLES), *hub.torque.knots])
+        times = np.unique([*np.linspace(0.0, end, 2001), *hub.torque.knots])
         speeds = hub.rigid_speeds(times, self.system.row.rest_inertia())
         return float(speeds[np.argmax(np.abs(speeds))])
 
@@ -319,12 +306,10 @@ class Explanation:
 
     def _history(self) -> OtherMesh | None:
         """March the own model with its companions, then the changes; return the problem on another mesh."""
-        case, steps = self.case, self.case.steps
-        assert case.scheme is not None
-        assert steps is not None
+        case = self.case
         try:
-            errors = HistoryErrors(self.problem, self.system, case.scheme, case.newton(), case.start)
-            own = self._marched(self.system, steps, [errors.steps])
+            errors = HistoryErrors(self.problem, self.system, self._scheme, case.newton(), case.start)
+            own = self._marched(self.system, self._time, [errors.steps])
         except ComputationError as error:
             self._fails(HISTORY, error.what)
             return on_other_mesh(self.problem, self.system)
@@ -348,15 +333,14 @@ class Explanation:
             own: its history in the case's own steps.
             error: of that by the steps, relative; None where it is unknown.
         """
-        scheme, doubt, before, rough = self.case.scheme, self.changes, own, dict[str, float | None]()
-        assert scheme is not None
+        scheme, doubt, before, rough = self._scheme, self.changes, own, dict[str, float | None]()
         if error is None or error > FAR:
             error, ratio = np.inf, 0.5
         elif error > ASYMPTOTIC:
             ratio = 2.0
         else:
             ratio = max(2.0, (ASYMPTOTIC / SAFETY / max(error, RESOLVED)) ** (1 / scheme.order) // 1)
-        while doubt and ratio >= SHORTEST:
+        while doubt and ratio >= 0.25:
             try:
                 history, found = self._changed(system, ratio, doubt)
             except ComputationError:
@@ -374,20 +358,16 @@ class Explanation:
 
     def _steps(self, ratio: float) -> Steps:
         """Return the case's steps in another length; adaptive ones by the tolerance."""
-        steps, scheme = self.case.steps, self.case.scheme
-        assert steps is not None
-        assert scheme is not None
-        if steps.step is None:
-            assert steps.tolerance is not None
-            return replace(steps, tolerance=min(steps.tolerance * ratio**scheme.order, ASYMPTOTIC))
-        return replace(steps, step=min(steps.step * ratio, max(LONGEST * steps.end, steps.step)))
+        steps: Any = self._time
+        changed = {"step": min(steps.step * ratio, max(LONGEST * steps.end, steps.step))} if steps.step else {}
+        if not changed:
+            changed = {"tolerance": min(steps.tolerance * ratio**self._scheme.order, ASYMPTOTIC)}
+        return Steps(**(vars(steps) | changed))
 
     def _marched(self, system: Any, steps: Steps, watches: Sequence[Companion]) -> History:
         """Return the history of the own model, followed by companions."""
         case, times, tips = self.case, list[float](), list[Array]()
-        assert case.scheme is not None
-
-        march = March(system, case.scheme, steps, case.newton(), *case.start(system))
+        march = March(system, self._scheme, steps, case.newton(), *case.start(system))
         march.stepper.observers = list(watches)
         for state in march:
             size = float(system.size(state.q))
@@ -428,14 +408,14 @@ class Explanation:
     def _following(self, own: Any, changes: Sequence[Change]) -> list[Companion | None]:
         """Return companions of changes that follow the own model; None of a theory without all terms."""
         out: list[Companion | None] = []
-        assert self.case.scheme is not None
         for system in self._variants(own, changes):
             if system is None:
                 out.append(None)
                 continue
-            companion = Companion(system, own, self.case.scheme, self.case.newton(), doubles=False)
-            longest = LARGEST_LINEAR_DEFLECTION if system.linear else FARTHEST
-            companion.limit, companion.part = longest * system.structure.length, DIGITS
+            companion = Companion(system, own, self._scheme, self.case.newton(), doubles=False)
+            # each of two tips is displaced by twice the length at most, and a change is shown with two digits
+            longest = LARGEST_LINEAR_DEFLECTION if system.linear else 4.0
+            companion.limit, companion.part = longest * system.structure.length, 1e-2
             try:
                 companion.begin(*self.case.start(system))
             except ComputationError:
