@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from rotfem.scene.blades.deck import Asked, keys_of
@@ -77,11 +77,9 @@ class PointMass(SceneModel):
         """Inertia tensor (kg·m²), shape (3, 3)."""
         return _as_matrix(self.inertia)
 
-    @model_validator(mode="after")
-    def _check_any(self) -> Self:
+    def _check(self) -> None:
         if self.mass == 0.0 and not np.any(self.inertia_matrix):
             raise problem("mass", self.mass, "give mass, inertia, or both")
-        return self
 
 
 class BeamStructure(StructureTable):
@@ -177,10 +175,8 @@ class PlanarBeamStructure(BeamStructure):
         """Position of the root in the frame (m)."""
         return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         self._check_tables()
-        return self
 
 
 def _as_sweep(value: Any) -> Profile:
@@ -279,11 +275,10 @@ class SpatialBeamStructure(BeamStructure):
         """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0
 
-    @model_validator(mode="before")
     @classmethod
-    def _lift_from_section(cls, data: Any, info: ValidationInfo) -> Any:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Read the blade file of another program, and move pretwist and precone out of a section that holds them."""
-        section = data.get("section") if isinstance(data, Mapping) else None
+        section = data.get("section")
         if isinstance(section, Mapping) and "from" in section:
             with problems_at("section.from", section["from"]):
                 path = existing_file(section["from"], info)
@@ -307,8 +302,7 @@ class SpatialBeamStructure(BeamStructure):
                 lifted[key] = read(section[key])
         return {**data, **lifted, "section": {key: value for key, value in section.items() if key not in lifted}}
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         slack = ROUND_OFF if self.line is None else DIGITS
         check_profile_length("pretwist", self.pretwist, self.length, slack)
         check_profile_length("sweep", self.sweep, self.length)
@@ -318,7 +312,6 @@ class SpatialBeamStructure(BeamStructure):
         self._check_tables(slack)
         self.root.check(self.precone)
         self._check_supports()
-        return self
 
     def _check_supports(self) -> None:
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
@@ -337,9 +330,9 @@ class SpatialBeamStructure(BeamStructure):
 Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
 
 
-def _with_length(data: Any, info: ValidationInfo) -> Any:
+def _with_length(data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
     """Return the table with the arc length of its line as its length; raise if another one is given."""
-    if not isinstance(data, Mapping) or data.get("line") is None:
+    if data.get("line") is None:
         return data
     with problems_at("line", data["line"]):
         rows = LINE_FILE(Unit("m").read(data["line"]), info)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError
@@ -126,21 +126,18 @@ class SpanLoad(Load):
         both = self.over_span_and_time
         yield from ((row[0], *row[2:]) for row in (both if isinstance(both, tuple) else ()))
 
-    @model_validator(mode="before")
     @classmethod
-    def _function_of_both(cls, data: Any) -> Any:
-        """Take a bare function of two arguments for one of place and time."""
-        given = data.get("function") if isinstance(data, Mapping) else data
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Take a function of two arguments for one of place and time."""
+        given = data.get("function")
         if not callable(given) or arguments(given) != 2:
             return data
-        rest = {key: value for key, value in data.items() if key != "function"} if isinstance(data, Mapping) else {}
-        return {**rest, "over_span_and_time": given}
+        return {**{key: value for key, value in data.items() if key != "function"}, "over_span_and_time": given}
 
-    @model_validator(mode="after")
-    def _check_function(self) -> Self:
+    def _check(self) -> None:
+        super()._check()
         if self.place_function is not None and self.harmonic:
             raise problem("harmonic", None, "cannot stand beside a function of the place, which can do the same")
-        return self
 
 
 class SpanMoment(SpanLoad):
@@ -187,11 +184,9 @@ class PointLoad(SceneModel):
         """Return the kind of one of the two."""
         return load.kind if "kind" in load.model_fields_set else self.kind
 
-    @model_validator(mode="after")
-    def _check_any(self) -> Self:
+    def _check(self) -> None:
         if self.force is None and self.moment is None:
             raise problem("force", None, "give force, moment, or both")
-        return self
 
 
 class Loads(SceneModel):

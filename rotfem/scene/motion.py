@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo
 
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
@@ -42,11 +42,10 @@ class Motion(SceneModel):
     axis: Axis = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
 
-    @model_validator(mode="before")
     @classmethod
-    def _check_type(cls, data: Any) -> Any:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Refuse keys of other types of motion, by their types."""
-        if isinstance(data, Mapping) and data.get("type") in BUILT_IN:
+        if data.get("type") in BUILT_IN:
             for key in (key for key in data if key not in cls.model_fields):
                 if types := [show(table.name) for table in _TABLES if key in table.model_fields]:
                     why = f"has no meaning with type = {show(data['type'])}; it belongs to type = {', '.join(types)}"
@@ -122,13 +121,11 @@ class TorqueMotion(Motion):
     hub_damping: Annotated[NonNegative, Unit("N*m*s")] = 0.0
     speed: Speed = 0.0
 
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
+    def _check(self) -> None:
         if self.pulses is not None and self.table is not None:
             raise problem("table", self.table, "give either pulses or table")
         if self.function is not None and (self.pulses is not None or self.table is not None):
             raise problem("function", None, "give either a function, which may have pulses in it, or pulses or table")
-        return self
 
 
 class CallableMotion(Motion):
@@ -170,20 +167,15 @@ class LawMotion(Motion):
         """The law with its parameters."""
         return motion_laws[self.type](**self.__pydantic_extra__)
 
-    @model_validator(mode="before")
     @classmethod
-    def _fill_law(cls, data: Any) -> Any:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Add the parameters of the law that are not given; a slip in its name comes before all others."""
-        if not isinstance(data, Mapping):
-            return data
         if data.get("type") is None:
             raise problem("type", None, f"required key is missing; allowed: {', '.join(map(show, motion_laws.names))}")
         return with_parameters(cls, data, "type", motion_laws)
 
-    @model_validator(mode="after")
-    def _check_law(self) -> Self:
+    def _check(self) -> None:
         check_parameters(motion_laws[self.type], "type", self.__pydantic_extra__)
-        return self
 
 
 _TABLES = (ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion, CallableMotion)

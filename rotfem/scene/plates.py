@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
@@ -138,8 +138,7 @@ class PlateStructure(StructureTable):
         """Return the thickness (m), which is not given by region, at coordinates x (m) along the plate, shape of x."""
         return evaluate(self.thickness, x)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _check(self) -> None:
         geometry = self._way(self.WAYS)
         material = self._way(self.MATERIALS)
         check_one_hub(self.hub_radius, self.hub_offset)
@@ -159,7 +158,6 @@ class PlateStructure(StructureTable):
             if abs(self.nu12) >= limit:
                 raise problem("nu12", self.nu12, f"must be less than √(E1/E2) = {limit:g} in size, else not stable")
         check_magnitudes(self._stiffnesses, "thickness")
-        return self
 
     def _stiffnesses(self) -> dict[str, Array]:
         """Return membrane and bending stiffnesses (N/m, N·m) and the mass per area (kg/m²) at all given thicknesses."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator
 
 from rotfem.scene.signals import Given, Harmonic, TimeFunction, time_table
 from rotfem.scene.table import SceneModel, Unit, problem
@@ -51,11 +51,10 @@ class PitchAngle(Given):
         """The angle of one that does not change, rad."""
         return (self.value or 0.0) + (self.table[0][1] if self.table is not None else 0.0)
 
-    @model_validator(mode="after")
-    def _check_rate(self) -> Self:
+    def _check(self) -> None:
+        super()._check()
         if self.rate is not None and self.function is None:
             raise problem("rate", None, "is that of a function; tables and harmonics have their own")
-        return self
 
 
 class Hinge(NamedTuple):
@@ -92,14 +91,12 @@ class Root(SceneModel):
         given = ((axis, name, getattr(self, f"{name}_stiffness")) for name, axis in self.AXES.items())
         return {a: Hinge(name, k, getattr(self, f"{name}_damping")) for a, name, k in given if k is not None}
 
-    @model_validator(mode="after")
-    def _check_dampers(self) -> Self:
+    def _check(self) -> None:
         for name in self.AXES:
             damping = getattr(self, f"{name}_damping")
             if damping > 0.0 and getattr(self, f"{name}_stiffness") is None:
                 why = f"needs {name}_stiffness, which may be 0: without it the root is rigid"
                 raise problem(f"{name}_damping", damping, why)
-        return self
 
 
 class SpatialRoot(Root):
@@ -165,11 +162,9 @@ class Support(SceneModel):
     stiffness: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
     damping: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
 
-    @model_validator(mode="after")
-    def _check_any(self) -> Self:
+    def _check(self) -> None:
         if not np.any(self.stiffness) and not np.any(self.damping):
             raise problem("stiffness", None, "give stiffness, damping, or both")
-        return self
 
     @property
     def isotropic(self) -> tuple[tuple[float, float], tuple[float, float]]:

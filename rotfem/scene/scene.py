@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from pydantic import BaseModel, Discriminator, Field, PlainValidator, PrivateAttr, Tag, ValidationError, model_validator
+from pydantic import BaseModel, Discriminator, Field, PlainValidator, PrivateAttr, Tag, ValidationError, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import SceneError, show
@@ -235,20 +235,15 @@ class Scene(SceneModel):
         """
         check_tables(self._file, self.structure, self.loads, when)
 
-    @model_validator(mode="before")
     @classmethod
-    def _mark_mesh(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping):
-            return data
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         structure, mesh = data.get("structure"), data.get("mesh", {})
         is_plate = structure.get("type") == "plate" if isinstance(structure, Mapping) else False
         return {**data, "mesh": _PlateTable(mesh) if is_plate and isinstance(mesh, Mapping) else mesh}
 
-    @model_validator(mode="after")
-    def _check_combinations(self) -> Self:
+    def _check(self) -> None:
         vars(self)["mesh"] = self.mesh.suited(self.structure)
         check_together(self)
-        return self
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Annotated, Any, ClassVar, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, PlainValidator, ValidationInfo, model_validator
+from pydantic import ConfigDict, PlainValidator, ValidationInfo
 
 from rotfem import registry
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
@@ -137,27 +137,19 @@ class Section(SceneModel):
         I2, I3 = g.second_moment2, g.second_moment3
         return E * g.area, k * G * g.area, G * g.torsion_constant, E * I2, E * I3, rho * g.area, rho * I2, rho * I3
 
-    @model_validator(mode="before")
     @classmethod
-    def _read_file(cls, data: Any, info: ValidationInfo) -> Any:
-        return with_columns(data, info, "") if isinstance(data, Mapping) else data
-
-    @model_validator(mode="before")
-    @classmethod
-    def _check_shape(cls, data: Any) -> Any:
-        """Check the name of the shape before the keys, as it says which there are."""
-        if isinstance(data, Mapping) and data.get("shape") is not None:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Read a file, and check the name of the shape before the keys, as it says which there are."""
+        if data.get("shape") is not None:
             as_name(data["shape"], registry.shapes, "shape")
-        return data
+        return with_columns(data, info, "")
 
-    @model_validator(mode="after")
-    def _check_way(self) -> Self:
+    def _check(self) -> None:
         if self.way.name == "shape":
             # All dimensions are linear between knots, so it is enough to look at the knots.
             dimensions = self._dimensions(np.array(self.knots))
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
-        return self
 
 
 def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import show
@@ -75,8 +75,7 @@ class Model(SceneModel):
     foreshortening: bool = False
     all_unknowns: bool = False
 
-    @model_validator(mode="after")
-    def _check_choice(self) -> Self:
+    def _check(self) -> None:
         if self.tolerance is not None and self.frame == "inertial":
             raise problem("tolerance", self.tolerance, 'needs frame = "rotating", as the cheaper theories do')
         if self.tolerance is not None and self.reduced:
@@ -85,7 +84,6 @@ class Model(SceneModel):
             raise problem(
                 "foreshortening", True, "needs reduced = true: it is given back to the shapes of a reduced model"
             )
-        return self
 
 
 def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:
@@ -123,8 +121,7 @@ class Initial(SceneModel):
         """The key that says how a motion starts; None where it starts at rest in a state of balance."""
         return next((key for key in ("tip_displacement", "mode", "velocity") if getattr(self, key) is not None), None)
 
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
+    def _check(self) -> None:
         if (self.mode is None) != (self.amplitude is None):
             raise problem("amplitude", self.amplitude, "mode and amplitude are given together")
         if self.phase != 0.0 and self.mode is None:
@@ -137,7 +134,6 @@ class Initial(SceneModel):
             if self.state == "steady" and "state" in self.model_fields_set:
                 raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
             vars(self)["state"] = "undeformed"
-        return self
 
 
 class BeamMesh(SceneModel):
@@ -183,12 +179,10 @@ class PlateMesh(SceneModel):
         vars(out)["elements"] = _counts_for(structure.length / structure.width)
         return out
 
-    @model_validator(mode="before")
     @classmethod
-    def _fill_degree(cls, data: Any) -> Any:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Add the degree that does not lock on triangles."""
-        triangles = isinstance(data, Mapping) and data.get("cell") == "triangle"
-        return {"degree": 3, **data} if triangles else data
+        return {"degree": 3, **data} if data.get("cell") == "triangle" else data
 
     def degree_on(self, cell: str) -> int:
         """Return the polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
@@ -278,33 +272,28 @@ class Time(SceneModel):
         """Parameters of the scheme by name, those that are not given with their defaults."""
         return dict(self.__pydantic_extra__)
 
-    @model_validator(mode="before")
     @classmethod
-    def _fill_scheme(cls, data: Any, info: ValidationInfo) -> Any:
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others.
 
         Where an accuracy is wanted and no steps are given, they follow from it.
         """
-        if not isinstance(data, Mapping):
-            return data
         given = {key: value for key, value in data.items() if value is not None}
         wanted = (info.context or {}).get("accuracy")
         if isinstance(wanted, float) and wanted > 0.0 and not {"step", "tolerance"} & given.keys():
             given["tolerance"] = wanted
         return with_parameters(cls, {"scheme": usual(given)} | given, "scheme", registry.schemes)
 
-    @model_validator(mode="after")
-    def _check_scheme(self) -> Self:
+    def _check(self) -> None:
         scheme = registry.schemes[self.scheme]
         check_parameters(scheme, "scheme", self.parameters)
         if self.tolerance is not None and not estimates_error(scheme):
             able = ", ".join(show(other.name) for other in registry.schemes if estimates_error(other))
             reason = f'scheme = "{self.scheme}" does not estimate its error, so its steps are fixed: give step instead'
             raise problem("tolerance", self.tolerance, f"{reason} (adaptive steps: {able})")
-        return self
+        self._check_steps()
 
-    @model_validator(mode="after")
-    def _check_steps(self) -> Self:
+    def _check_steps(self) -> None:
         if (self.step is None) == (self.tolerance is None):
             reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
             raise problem("step", self.step, reason)
@@ -317,7 +306,6 @@ class Time(SceneModel):
                 raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
         if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
             raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
-        return self
 
 
 def _as_orders(value: Any) -> tuple[int, ...]:

@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
-from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator
 
 from rotfem.scene.files import Check, as_table
 from rotfem.scene.table import SceneModel, Unit, problem
@@ -143,11 +143,9 @@ class Harmonic(SceneModel):
     per_rev: Positive | None = None
     phase: Annotated[Number, Unit("rad")] = 0.0
 
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
+    def _check(self) -> None:
         if (self.frequency is None) == (self.per_rev is None):
             raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
-        return self
 
 
 class Given(SceneModel):
@@ -174,11 +172,8 @@ class Given(SceneModel):
         """Whether the third component of all vectors is zero."""
         return not any(vector[2] for vector in self.vectors if len(vector) > 2)
 
-    @model_validator(mode="before")
     @classmethod
-    def _from_bare(cls, data: Any) -> Any:
-        if isinstance(data, Given):
-            return data
+    def _table(cls, data: Any) -> Any:
         if isinstance(data, Mapping):
             one = isinstance(data.get("harmonic"), Mapping | Harmonic)
             return {**data, "harmonic": [data["harmonic"]]} if one else data
@@ -188,14 +183,12 @@ class Given(SceneModel):
         path = isinstance(data, str) and not is_quantity(data)
         return {"table" if rows or path else "value": data}
 
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
+    def _check(self) -> None:
         harmonic = vars(self).get("harmonic")
         if len(self.given) > 1 or not (self.given or harmonic):
             ways = ", ".join(name for name in self.WAYS if name != "function")
             added = "" if harmonic is None else "; harmonic may be given in addition"
             raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}{added}")
-        return self
 
 
 class Signal(Given):

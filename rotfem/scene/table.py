@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from inspect import Parameter, Signature
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, Self, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, ValidationInfo, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rotfem.errors import Problem, SceneError, show
@@ -186,14 +186,28 @@ class SceneModel(BaseModel, metaclass=InputErrors):
         """Return all keys that the table may have."""
         return list(cls.model_fields)
 
+    @classmethod
+    def _table(cls, data: Any) -> Any:
+        """Return the table that a value stands for, which may be written without it."""
+        return data
+
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Return a table as it is given with what other keys say in addition, before its keys are checked."""
+        return data
+
+    def _check(self) -> None:
+        """Raise a problem where keys do not go together."""
+
     @model_validator(mode="before")
     @classmethod
-    def _check_keys(cls, data: Any) -> Any:
+    def _read_keys(cls, data: Any, info: ValidationInfo) -> Any:
         if isinstance(data, cls):
             return data
+        data = cls._table(data)
         if not isinstance(data, Mapping):
             raise problem("", data, "must be a table of key = value pairs")
-        names = cls.keys()
+        data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
                 hint = did_you_mean(key, names)
@@ -202,6 +216,11 @@ class SceneModel(BaseModel, metaclass=InputErrors):
             if field.is_required() and name not in data:
                 raise problem(name, None, f"required key is missing; must be {field.description or 'given'}")
         return data
+
+    @model_validator(mode="after")
+    def _check_keys(self) -> Self:
+        self._check()
+        return self
 
 
 @dataclass(frozen=True)
@@ -250,7 +269,9 @@ def parameters_of(entry: type) -> dict[str, Field[Any]]:
     return {field.name: field for field in fields(entry) if field.init} if is_dataclass(entry) else {}
 
 
-def with_parameters(table: type[SceneModel], data: Mapping[str, Any], key: str, registry: Registry[Any]) -> Any:
+def with_parameters(
+    table: type[SceneModel], data: Mapping[str, Any], key: str, registry: Registry[Any]
+) -> dict[str, Any]:
     """Return the data of a table with the parameters that are not given of the class that `key` names.
 
     Raise where there is no such class, or a parameter without a default is missing.
