@@ -229,7 +229,12 @@ class Simulation:
     def result(self, status: str, failure: ComputationError | None = None) -> RunResult:
         """Return everything computed so far with a summary of how it went."""
         history, log = self.record.history.arrays(), self.log
-        log.warnings += self._said_of_steps(history, failure)
+        log.warnings += [] if self.stepper is None else self.stepper.warnings()
+        if self.iteration.roundoff > 0:
+            log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
+        if failure is None and self.stepper is not None:
+            grown = monitor.energy_warning(self.system, history, self.rows is not None)
+            log.warnings += [grown] if grown else []
         watched = self.monitor
         if status == "done" and watched.since is not None:
             log.warnings.append(
@@ -270,16 +275,6 @@ class Simulation:
             what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)
         return monitor.with_cause(error, self.system, self.record.history.arrays(), self.rows is not None)
-
-    def _said_of_steps(self, history: dict[str, Array], failure: ComputationError | None) -> list[str]:
-        """Return what is to be known of the steps and their iterations."""
-        out = [] if self.stepper is None else self.stepper.warnings()
-        if self.iteration.roundoff > 0:
-            out.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
-        if failure is None and self.stepper is not None:
-            grown = monitor.energy_warning(self.system, history, self.rows is not None)
-            out += [grown] if grown else []
-        return out
 
     @property
     def _wants_error(self) -> bool:

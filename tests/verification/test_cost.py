@@ -15,7 +15,6 @@ import rotfem
 from rotfem.commands.accuracy import changes_of
 from rotfem.commands.cost.bench import Bench, Measurement
 from rotfem.commands.cost.result import CostResult, setting_of
-from rotfem.commands.cost.study import RECORD
 from rotfem.refinement.distance import distance, largest
 from rotfem.refinement.refine import Setting
 
@@ -200,7 +199,7 @@ def test_an_interrupted_study_keeps_what_is_finished(
     monkeypatch.setattr(Bench, "measure", interrupted)
     with pytest.raises(KeyboardInterrupt):
         study(tmp_path)
-    assert len((tmp_path / RECORD).read_text().splitlines()) == 2
+    assert len((tmp_path / "cost.jsonl").read_text().splitlines()) == 2
     monkeypatch.setattr(Bench, "measure", measure)
     assert study(tmp_path).summary["measured"] == finished[1].summary["measured"] - 2 > 0
 
