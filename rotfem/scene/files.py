@@ -175,9 +175,6 @@ def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -
     return set_keys(file, data, [parse_override(file, override) for override in overrides])
 
 
-#: Bytes of a table, at most, for each row that it may have: a row may have a 6×6 matrix in it.
-ROW_BYTES = 1600
-
 #: Characters of a cell that a message shows. A file may be anything that can be read here, and so a secret.
 SHOWN_CELL = 12
 
@@ -227,7 +224,7 @@ def as_table(
 def table_text(value: Any, info: ValidationInfo) -> tuple[Path, str]:
     """Return the path of a file that a scene names and its text, of no more rows than the scene's limits allow."""
     path, limits = existing_file(value, info), limits_in(info)
-    text = read_text(path, ROW_BYTES * limits.rows)
+    text = read_text(path, 1600 * limits.rows)  # bytes: a row may have a 6×6 matrix in it
     limits.check("rows", text.count("\n"), value=str(path))
     return path, text
 

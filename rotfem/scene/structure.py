@@ -34,23 +34,18 @@ class StructureKind:
     discretised: str | Callable[..., Any] = ""
 
 
-def is_design(tables: Mapping[str, Any]) -> bool:
-    """Return whether the structure of a scene is given by a design."""
-    given = tables.get("structure")
-    name = given.get("type") if isinstance(given, Mapping) else None
-    return isinstance(name, str) and name in structures and structures[name].table is not None
-
-
 def designed(tables: dict[str, Any], file: str) -> dict[str, Any]:
     """Return the tables of a scene with the structure that a design stands for in its place."""
     seen = set[str]()
-    while is_design(tables):
-        given = dict(tables["structure"])
-        name = given.pop("type")
+    while isinstance(given := tables.get("structure"), Mapping):
+        name = given.get("type")
+        if not isinstance(name, str) or name not in structures or structures[name].table is None:
+            break
         if name in seen:
             raise SceneError(file, "structure.type", name, "is a design that stands for itself")
         seen.add(name)
-        tables = {**tables, "structure": _table_of(structures[name].table, given, name, file)}
+        parameters = {key: value for key, value in given.items() if key != "type"}
+        tables = {**tables, "structure": _table_of(structures[name].table, parameters, name, file)}
     return tables
 
 
@@ -165,15 +160,12 @@ class Damping(SceneModel):
 
 # --- what structures share --------------------------------------------------------------------------------------------
 
-#: Part of the length within which two places along a beam are one.
-SAME_PLACE = 1e-7
-
 
 def apart(places: Collection[float], length: float) -> tuple[float, ...]:
     """Return places along a beam (m) in order, but one of those that only round-off keeps apart, and no end."""
-    out = [0.0]
+    out, same = [0.0], 1e-7 * length
     for x in sorted(places):
-        if x - out[-1] > SAME_PLACE * length and length - x > SAME_PLACE * length:
+        if x - out[-1] > same and length - x > same:
             out.append(x)
     return tuple(out[1:])
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
-from rotfem.scene.values import DIGITS, Array
+from rotfem.scene.values import Array
 
 #: Components along our axes 1, 2, 3 from those along x (flapwise, downwind), y (to the trailing edge), z (to the tip)
 #: of IEC 61400-13 and OpenFAST.
@@ -22,16 +22,6 @@ def turned_matrix(matrix: npt.ArrayLike, axes: Array) -> Array:
     """Return a 6×6 matrix along our axes; axes (3, 3) gives components along ours from those of the file."""
     both = np.kron(np.eye(2), axes)
     return np.asarray(both @ np.asarray(matrix) @ both.T)
-
-
-def is_symmetric(matrix: Array) -> bool:
-    """Return whether a matrix is symmetric to what another program may have left."""
-    return bool(np.max(np.abs(matrix - matrix.T)) <= DIGITS * np.max(np.abs(matrix)))
-
-
-def symmetric(matrix: Array) -> Array:
-    """Return a matrix with what its digits leave of asymmetry taken out."""
-    return (matrix + matrix.T) / 2
 
 
 def scaled_rows(x: npt.ArrayLike, length: float, values: npt.ArrayLike) -> list[list[Any]]:

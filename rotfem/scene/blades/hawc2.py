@@ -42,9 +42,6 @@ FULL += [f"K{place}" for place in UPPER]
 #: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
 POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
 
-#: Part of its middle value by which a product of columns may be off between rows: a frequency goes with its root.
-PRODUCT = 1e-4
-
 
 def recognises(deck: Deck) -> bool:
     """Return whether there are main bodies, or lines of sets (#1) and of their parts ($1 with a number of rows)."""
@@ -184,14 +181,15 @@ def _products(table: dict[str, Array]) -> dict[str, Array]:
 
 
 def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
-    """Return columns with so many rows between theirs that products which are linear there are right to PRODUCT.
+    """Return columns with so many rows between theirs that products which are linear there are right to 1e-4.
 
     Columns are linear between rows, so a product of two, linear between n parts, has 1/n² of the error of one part.
+    A frequency goes with the root of a product.
     """
     r = table["r"]
     ends, middle = _products(table), _products({name: (c[1:] + c[:-1]) / 2 for name, c in table.items()})
     off = np.max([np.abs((ends[key][1:] + ends[key][:-1]) / (2 * middle[key]) - 1.0) for key in ends], axis=0)
-    parts = np.maximum(1, np.ceil(np.sqrt(off / PRODUCT))).astype(int)
+    parts = np.maximum(1, np.ceil(np.sqrt(off / 1e-4))).astype(int)
     places = np.interp(np.arange(parts.sum() + 1), np.cumsum([0, *parts]), r)
     return {name: np.interp(places, r, column) for name, column in table.items()} | {"r": places}
 

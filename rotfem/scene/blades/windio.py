@@ -124,19 +124,17 @@ def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
     """Return the table of stiffness matrices from their elements, each over the grid."""
     count = len(table["K44"].numbers())
     grid = table["grid"].grid(count)
-    diagonal = {name: _column(table, name, count) for name in DIAGONAL}
-    for name, values in diagonal.items():
-        for i in np.flatnonzero(values <= 0.0):
-            table[name].entries()[i].fail(f"is {values[i]:g}; must be greater than 0")
+    columns = {name: _column(table, name, count, needed=name in DIAGONAL) for name in ELEMENTS}
+    for name in DIAGONAL:
+        for i in np.flatnonzero(columns[name] <= 0.0):
+            table[name].entries()[i].fail(f"is {columns[name][i]:g}; must be greater than 0")
     outer = grid >= 0.5
-    if np.all(diagonal["K44"][outer] < diagonal["K55"][outer]):
+    if np.all(columns["K44"][outer] < columns["K55"][outer]):
         table["K44"].fail(
             "is less than K55 on the outer half of the blade: x and y of the matrices must be those of the reference "
             "axis, x flapwise, so that K44 is edgewise and K55 flapwise bending"
         )
-    upper = np.zeros((count, len(ELEMENTS)))
-    for column, name in enumerate(ELEMENTS):
-        upper[:, column] = _column(table, name, count, needed=False)
+    upper = np.stack(list(columns.values()), axis=-1)
     return scaled_rows(grid, length, _matrices(upper, table["K44"].entries(), definite=True))
 
 
