@@ -103,6 +103,8 @@ class FollowingStepper(Stepper):
         if len(self.differences) > 1:
             before, other = self.differences[0]
             guess += (stage.t - t) / (t - before) * (difference - other)
+        clamped = self.system.held.clamped
+        guess[clamped] = stage.q[clamped]  # no iteration corrects them: round-off of what is carried would add up
         return guess
 
     def _followed_at(self, t: float, step: Followed) -> Array:
