@@ -18,9 +18,10 @@ from petsc4py import PETSc
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
-from rotfem.numerics.projection import orthonormal, summed, times
+from rotfem.numerics.projection import orthonormal, summed, times, with_ghosts
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -131,14 +132,15 @@ class ReducedAnalysis(ModalAnalysis):
 
     def __init__(self, full: ModalAnalysis):
         self.full = full
-        self.problem, self.about, self.comm, self.newton = full.problem, full.about, full.comm, full.newton
-        self.everyone = full.everyone
-        self.system, self.model, self.structure, self.free = full.system, full.model, full.structure, full.free
-        self.seconds, self._unit, self.mesh_by_shape = full.seconds, full._unit, False
-        self.estimates, self.past_limits, self.fixed = full.estimates, full.past_limits, full.fixed
+        numbers = np.array([i for i, p in enumerate(full.system.pieces) if p.kind in "MCK"])
+        self.basis = ReducedModel(full.system, numbers)
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
         self._asymmetries: dict[str, float] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the analysis of the full system has under a name."""
+        return getattr(self.full, name)
 
     def prepare(self, first: float, last: float, count: int) -> bool:
         """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
@@ -186,21 +188,17 @@ class ReducedAnalysis(ModalAnalysis):
 
     def _project(self) -> None:
         """Make the columns orthonormal and project every piece."""
-        system = self.system
-        self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
-        pieces = [system.pieces[i] for i in self._index]
-        K = system.material
+        system, basis = self.system, self.basis
         # In the inertia instead, directions that have none would be lost.
-        self.V = orthonormal(self.comm, np.array(self._columns).T, lambda X: times(K, X))
-        products = [times(p.operator, self.V) for p in pieces]
-        self._pieces = [(p, summed(self.comm, self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
-        masses = [i for i, p in enumerate(pieces) if p.kind == "M"]
-        self.mass = np.sum([products[i] for i in masses], axis=0)
-        self._root = root_of(np.sum([self._pieces[i][1] for i in masses], axis=0))
-        stacked = np.hstack(products)
+        self.V = orthonormal(self.comm, np.array(self._columns).T, lambda X: times(system.material, X))
+        basis.take(with_ghosts(system.V, self.V))
+        self._index = [i for kind in "MCK" for i in basis.kinds[kind]]
+        self.mass = np.sum([basis.products[i] for i in basis.kinds["M"]], axis=0)
+        self._root = root_of(basis.small["M"].sum(axis=0))
+        stacked = np.hstack([basis.products[i] for i in self._index])
         self._grams = summed(self.comm, stacked.T @ stacked)
         self._metric = summed(self.comm, self.V.T @ self.V)
-        self._norms = [float(p.operator.norm()) for p in pieces]
+        self._norms = [float(system.pieces[i].operator.norm()) for i in self._index]
         self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
 
     def at(
@@ -209,13 +207,11 @@ class ReducedAnalysis(ModalAnalysis):
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         system = self.system
         zero = system.zeros()
-        c = system.coefficients(system.motion.at_speed(speed))[self._index]
-        small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
-        for ci, (p, matrix) in zip(c, self._pieces, strict=True):
-            small[p.kind] += ci * matrix
-        pencil = SmallPencil(small["M"], small["C"], small["K"], self._root, self._asymmetries)
+        c = system.coefficients(system.motion.at_speed(speed))
+        M, C, K = (A[0] for A in self.basis.operators(c[None, :]))
+        pencil = SmallPencil(M, C, K, self._root, self._asymmetries)
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
-        pairs.errors = self._backward_errors(pairs, c)
+        pairs.errors = self._backward_errors(pairs, c[self._index])
         pencil.owner = self
         out = Spinning(speed, zero, pencil, pairs, pencil)
         X = product(self.V, pairs.right)
@@ -237,7 +233,7 @@ class ReducedAnalysis(ModalAnalysis):
 
         Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
         """
-        power = np.array([{"M": 2, "C": 1, "K": 0}[p.kind] for p, _ in self._pieces])
+        power = np.repeat([2, 1, 0], [len(self.basis.kinds[kind]) for kind in "MCK"])
         factors = c[:, None] * pairs.values[None, :] ** power[:, None]
         parts = (factors[:, None, :] * pairs.right[None, :, :]).reshape(-1, len(pairs.values))
         residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real

@@ -153,13 +153,9 @@ class HeldEquations:
         """Return angle (rad), speed and its rate of the frame at times (n,), s, (n, 3)."""
         return self.excitation.turn(t)
 
-    def structure(self, y: Array) -> Array:
-        """Return the coordinates of the structure (…, m) among unknowns."""
-        return y[..., : self.model.size]
-
     def coordinates(self, solution: Solution, t: Array) -> States:
         """Return the states (n, m) of the structure in a solution at times (n,), s."""
-        q, v, a = (self.structure(x) for x in solution.at(t))
+        q, v, a = (x[:, : self.model.size] for x in solution.at(t))
         return q, v, a
 
     def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -184,9 +180,9 @@ class HeldEquations:
 
         def forces(t: Array) -> Array:
             c = self.excitation.factors(t, self.turn(t, solution))
-            states = solution.at(t, fastest)
+            states, m = solution.at(t, fastest), self.model.size
             out = np.zeros_like(states[0])
-            self.structure(out)[:] = manifold.forces(c, *(self.structure(x) for x in states))
+            out[:, :m] = manifold.forces(c, *(x[:, :m] for x in states))
             return out
 
         return forces

@@ -35,6 +35,7 @@ class ReducedModel:
     Attributes:
         V: basis, local dof arrays with their ghosts, shape (n, m).
         kinds: "M", "C", "K", "f" ↦ numbers of the active pieces of that kind.
+        products: numbers of the matrices ↦ their products with the basis, owned rows (n, m).
         small: "M", "C", "K" ↦ projected pieces (p, m, m), "f" ↦ (p, m).
     """
 
@@ -46,7 +47,7 @@ class ReducedModel:
         self.kinds = {kind: [i for i, p in pieces if p.kind == kind] for kind in "MCKf"}
         loads = [system.pieces[i].operator.array[self.owned] for i in self.kinds["f"]]
         self.loads: Array = np.array(loads).reshape(len(loads), self.owned.stop)
-        self._take(np.empty((len(system.zeros()), 0)))
+        self.take(np.empty((len(system.zeros()), 0)))
 
     @property
     def size(self) -> int:
@@ -76,17 +77,17 @@ class ReducedModel:
         if not len(keep):
             return 0
         new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])
-        self._take(with_ghosts(self.system.V, orthonormal(self.comm, new, self._strained)))
+        self.take(with_ghosts(self.system.V, orthonormal(self.comm, new, self._strained)))
         return len(keep)
 
-    def _take(self, V: Array) -> None:
+    def take(self, V: Array) -> None:
         """Take a basis (n, m), and project all pieces on it."""
         self.V, owned, m = V, V[self.owned], V.shape[1]
         matrices = [i for kind in "MCK" for i in self.kinds[kind]]
-        self._products = {i: times(self.system.pieces[i].operator, owned) if m else owned for i in matrices}
+        self.products = {i: times(self.system.pieces[i].operator, owned) if m else owned for i in matrices}
         self.small: dict[str, Array] = {"f": np.asarray(summed(self.comm, self.loads @ owned))}
         for kind in "MCK":
-            projected = [summed(self.comm, owned.T @ self._products[i]) for i in self.kinds[kind]]
+            projected = [summed(self.comm, owned.T @ self.products[i]) for i in self.kinds[kind]]
             self.small[kind] = np.array(projected).reshape(len(projected), m, m)
 
     def _strained(self, X: Array) -> Array:
@@ -125,7 +126,7 @@ class ReducedModel:
         out = (c[:, self.kinds["f"]] @ self.loads).T
         for kind, x in (("M", a), ("C", v), ("K", q)):
             for i in self.kinds[kind]:
-                out += self._products[i] @ (c[:, i, None] * x).T
+                out += self.products[i] @ (c[:, i, None] * x).T
         return np.asarray(out)
 
     def stiffness(self, c: Array) -> DirectSolver:
