@@ -24,6 +24,9 @@ from rotfem.analysis.reduced.solution import Solution, States, cut
 
 Array = npt.NDArray[np.float64]
 
+#: Most columns of a basis.
+MOST = 60
+
 #: Part of an accuracy below which the amplitude of a shape is of no account.
 NEGLIGIBLE = 0.01
 
@@ -98,7 +101,7 @@ def reduced_response(
 ) -> Response:
     """Return the history of a linear theory by a reduced model, from rest in the turning frame.
 
-    Each round adds six shapes to the basis, up to 60 columns; 64 steps are halved ten times at most.
+    Each round adds six shapes to the basis, up to MOST columns; 64 steps are halved ten times at most.
 
     Args:
         system: equations of a linear theory, bordered if its hub is free.
@@ -129,7 +132,7 @@ def reduced_response(
         tips = states[0] @ model.tips().T
         if before is not None:
             basis_error = difference(tips, before)
-        if basis_error <= accuracy or model.size >= 60:
+        if basis_error <= accuracy or model.size >= MOST:
             break
         before = tips
         least = (NEGLIGIBLE * accuracy) ** 2 * float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
