@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from importlib import import_module
@@ -100,31 +101,35 @@ def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
         raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
 
-def check_parts(path: Path, tree: Tree) -> None:
-    """Refuse a tree that does not consist of what `Memory.taken` writes, each part of its type.
+@contextmanager
+def trusted(path: Path) -> Iterator[None]:
+    """Turn whatever goes wrong with the content of a checkpoint whose sum is right into one error.
 
     Raises:
-        SceneError: it does not; names the part.
+        SceneError: it does not hold what a checkpoint of this run does.
     """
+    try:
+        yield
+    except SceneError:
+        raise
+    except Exception as error:  # of any kind, as anything may lie anywhere
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        why = f"does not hold what a checkpoint of this run does: {what}; start the run anew, without --resume"
+        raise SceneError("command line", "--resume", path, why) from None
+
+
+def check_parts(tree: Tree) -> None:
+    """Refuse a tree that does not consist of what `Memory.taken` writes, each part of its type, by any error."""
     wrong = set(tree) ^ set(PARTS) or {name for name, kinds in PARTS.items() if not isinstance(tree[name], kinds)}
     if wrong:
-        raise damaged(path, ", ".join(sorted(map(str, wrong))))
-    try:
-        json.dumps([tree["identity"], tree["versions"]["rotfem"]])
-        every = [tree["every"][name] for name in ("seconds", "steps") if tree["every"][name] is not None]
-        if len(every) != 1 or not every[0] > 0.0:
-            raise ValueError("every")
-        if (settings := tree["settings"]) is not None:
-            known = {name: settings[name] for name in ("elements", "scheme")}
-            alike(vars(Setting((), None, 0)) | known, settings, "settings")
-    except (LookupError, TypeError, ValueError) as error:
-        raise damaged(path, f"{type(error).__name__}: {error}") from None
-
-
-def damaged(path: Path, what: str) -> SceneError:
-    """Return the error of a checkpoint whose sum is right and whose content is not."""
-    why = f"does not hold what a checkpoint of this run does: {what}; start the run anew, without --resume"
-    return SceneError("command line", "--resume", path, why)
+        raise ValueError(", ".join(sorted(map(str, wrong))))
+    json.dumps([tree["identity"], tree["versions"]["rotfem"]])
+    every = [tree["every"][name] for name in ("seconds", "steps") if tree["every"][name] is not None]
+    if len(every) != 1 or not every[0] > 0.0:
+        raise ValueError("every")
+    if (settings := tree["settings"]) is not None:
+        known = {name: settings[name] for name in ("elements", "scheme")}
+        alike(vars(Setting((), None, 0)) | known, settings, "settings")
 
 
 class Packing:
@@ -237,17 +242,13 @@ class Memory:
         Raises:
             SceneError: the mesh is another one, or something in the tree is not what a run has.
         """
-        try:
+        with trusted(path):
             here, there = self.packing.numbering.comm.bcast(self.packing.numbering.positions), tree["positions"]
             size = float(np.max(np.ptp(here, axis=0)))
             if there.shape != here.shape or np.max(np.abs(there - here)) > 1e-9 * size:
                 raise SceneError("command line", "--resume", path, "is of another mesh")
             self._check_rows(tree)
             return self._put_back(tree)
-        except SceneError:
-            raise
-        except Exception as error:  # of any kind, as anything may lie anywhere
-            raise damaged(path, " ".join(f"{type(error).__name__}: {error}".split())) from None
 
     def _put_back(self, tree: Tree) -> State:
         stepper, unpacked, monitor, record = self.stepper, self.packing.unpacked, self.monitor, self.record

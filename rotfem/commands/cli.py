@@ -15,7 +15,7 @@ from rotfem.errors import SceneError, input_of
 from rotfem.units import split_unit
 
 if TYPE_CHECKING:
-    from rotfem.commands.result_folder import Writer
+    from rotfem.results.result_set import Writer
 
 
 @command()

@@ -26,7 +26,7 @@ from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
 
 if TYPE_CHECKING:
-    from rotfem.commands.result_folder import ResultFolder, Writer
+    from rotfem.results.result_set import ResultFolder, Writer
 
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
@@ -151,7 +151,7 @@ class Session:
 
     def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
         """Return the result folder, made and locked; say so if the command before was killed there."""
-        from rotfem.commands.result_folder import ResultFolder
+        from rotfem.results.result_set import ResultFolder
 
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise

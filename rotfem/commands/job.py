@@ -20,8 +20,8 @@ from rotfem.units import seconds_of
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
-    from rotfem.commands.result_folder import ResultFolder, Writer
     from rotfem.results import Result
+    from rotfem.results.result_set import ResultFolder, Writer
     from rotfem.scene import Scene
 
 app = typer.Typer(
@@ -159,7 +159,9 @@ def job(
             raise InputError("", None, lacking)
         session.speed_unit = loaded.output.speed
         session.start(f"{loaded.name}: {command}")
-        folder = session.folder(output or Path("results") / folder_name(loaded.name), command, loaded.inputs)
+        if output is None and loaded.name in ("", ".", ".."):
+            raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
+        folder = session.folder(output or Path("results") / loaded.name, command, loaded.inputs)
         with held_back():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         if report and find_spec("bokeh") is None:
@@ -206,10 +208,3 @@ def command(
         return work
 
     return decorate
-
-
-def folder_name(scene: str) -> str:
-    """Return the name of the folder of a scene's results: the scene's own, if that is the name of one."""
-    if scene in ("", ".", ".."):
-        raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{scene}"')
-    return scene

@@ -35,7 +35,6 @@ from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Recorder, reduced_history
-from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.run_store import Interval, RunStore
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
@@ -47,6 +46,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.refinement.companion import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Clock, Setting
+from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.structures.symmetry import inactive_unknowns

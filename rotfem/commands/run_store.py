@@ -11,14 +11,13 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Tree, check_identity, check_parts, comparable, identity
+from rotfem.commands.checkpoint import Memory, Tree, check_identity, check_parts, comparable, identity, trusted
 from rotfem.commands.interrupts import Interrupts
-from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError, Stopped
 from rotfem.refinement.refine import Setting
 from rotfem.results.checkpoint_file import read_checkpoint, write_checkpoint
 from rotfem.results.files import CHECKPOINT
-from rotfem.results.result_set import ResultSet, read_summary
+from rotfem.results.result_set import ResultFolder, ResultSet, read_summary
 from rotfem.results.run import LiveTable
 from rotfem.scene import Scene
 
@@ -108,7 +107,8 @@ class RunStore:
 
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
-            check_parts(path, tree)
+            with trusted(path):
+                check_parts(tree)
             check_identity(path, tree, self._identity, end)
             return tree
 
