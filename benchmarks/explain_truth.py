@@ -1,8 +1,8 @@
 """How good every row of `rotfem explain` is on ten scenes, against runs on finer meshes with finer steps.
 
-    ./with-fenicsx python3 benchmarks/explain_truth.py [further | odd | unseen | SCENE …]
+    ./with-fenicsx python3 benchmarks/explain_truth.py [fresh | further | odd | unseen | last | SCENE …]
 
-of `explain_scenes.FRESH`, of the scenes of `explain_further_scenes` and its like, or of those named.
+of `explain_scenes.SETS["fresh"]`, of the sets named, or of the scenes named.
 
 The truth of an effect or a theory is the difference of two runs on twice the elements with a quarter of the steps in a
 scheme of fourth order; of the steps and the mesh that of the scene's own to the finer ones. Columns: kind, name and
@@ -15,10 +15,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from explain_further_scenes import FURTHER
-from explain_odd_scenes import ODD
-from explain_scenes import FRESH, scene
-from explain_unseen_scenes import UNSEEN
+from explain_scenes import SETS, scene
 
 import rotfem
 from rotfem.commands.explain import compared
@@ -95,10 +92,7 @@ def with_truth(of: Scene, result: Any) -> list[dict[str, Any]]:
 def main() -> None:
     """Print the table, and how many rows are within a factor 3, large ones for large ones counted with them."""
     inside, missed = [], []
-    asked = sys.argv[1:] or list(FRESH)
-    FRESH.update(FURTHER | ODD | UNSEEN)
-    sets = {"further": FURTHER, "odd": ODD, "unseen": UNSEEN}
-    for name in [name for one in asked for name in sets.get(one, [one])]:
+    for name in [name for one in sys.argv[1:] or ["fresh"] for name in SETS.get(one, [one])]:
         result = rotfem.explain(scene(name))
         print(f"{name}: {', '.join(result.summary['effects'])}", flush=True)
         for row in with_truth(scene(name), result):
