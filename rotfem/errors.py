@@ -45,9 +45,7 @@ class InputError(ValueError):
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
         super().__init__(key, value, allowed)
-        self.key = key
-        self.value = value
-        self.allowed = allowed
+        self.key, self.value, self.allowed = key, value, allowed
 
     def __str__(self) -> str:
         return str(Problem(self.key, self.value, self.allowed))
@@ -82,13 +80,10 @@ class SceneError(InputError):
     def __init__(
         self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Problem] = ()
     ) -> None:
-        # All arguments go to the base class so that the error survives pickling (between MPI ranks).
-        Exception.__init__(self, file, key, value, allowed, tuple(others))
-        self.file = file
-        self.key = key
-        self.value = value
-        self.allowed = allowed
-        self.others = tuple(others)
+        super().__init__(key, value, allowed)
+        self.file, self.others = file, tuple(others)
+        # All arguments are kept so that the error survives pickling (between MPI ranks).
+        self.args = (file, key, value, allowed, self.others)
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -116,9 +111,7 @@ class ComputationError(RuntimeError):
 
     def __init__(self, what: str, time: float | None = None, advice: str = "") -> None:
         super().__init__(what, time, advice)
-        self.what = what
-        self.time = time
-        self.advice = advice
+        self.what, self.time, self.advice = what, time, advice
         self.result: Any = None
 
     def __str__(self) -> str:

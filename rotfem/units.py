@@ -14,7 +14,6 @@ _NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 #: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
 _NAMED = r"(?:[^\W\d]\w*|°|%)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_NAMED}(?:\s*[*/·\s]\s*{_NAMED})*)\s*")
-_POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^": "**"})
 
 
 def is_quantity(text: str) -> bool:
@@ -127,15 +126,9 @@ def _factor(name: str, unit: str) -> float:
 
     registry = _registry()
     try:
-        given = registry.parse_units(_superscripts(name).translate(_POWERS))
-        one = registry.Quantity(1.0, given)
+        one = registry.Quantity(1.0, registry.parse_units(name))
         return float(one.m_as(unit) if unit else one.to_base_units().magnitude)
     except pint.DimensionalityError:
         raise ValueError(f"{name!r} is no unit of the kind of {shown(unit)}") from None
     except Exception:  # pint has errors of its own, Python's tokenizer and parser theirs
         raise ValueError(f"{name!r} is no unit that is known; must be one of the kind of {shown(unit)}") from None
-
-
-def _superscripts(name: str) -> str:
-    """Return a unit with negative powers as pint reads them: m⁻¹ ↦ m**-1."""
-    return re.sub("⁻([¹²³⁴])", lambda power: f"**-{'¹²³⁴'.index(power[1]) + 1}", name)
