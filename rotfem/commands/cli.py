@@ -293,7 +293,7 @@ def import_(
         if hint := session.hint(False):
             for line in scene.hints:
                 hint(line)
-        structure = scene.structure
+        structure: Any = scene.structure
         session.say([f"{output}: {structure.type} of {file.name}, rows at {len(structure.knots) + 2} places"])
 
 

@@ -177,13 +177,8 @@ class StructureTable(SceneModel):
     is_planar: ClassVar[bool] = False
 
     @property
-    def knots(self) -> tuple[float, ...]:
-        """Places (m) along a beam, increasing, at which tables have rows or something stands."""
-        return ()
-
-    @property
     def nodes(self) -> tuple[float, ...]:
-        """Those of them, increasing, that its mesh must have nodes at: masses, and kinks of its axis."""
+        """Places (m) along a beam, increasing, that its mesh must have nodes at: masses, and kinks of its axis."""
         return ()
 
     @property
@@ -194,11 +189,6 @@ class StructureTable(SceneModel):
     @property
     def pitches(self) -> bool:
         """Whether it has a pitch that changes with time."""
-        return False
-
-    @property
-    def has_fibers(self) -> bool:
-        """Whether its sections twist about an axis, beside which they have fibers that this stretches."""
         return False
 
     @property
