@@ -18,7 +18,6 @@ drives.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,61 +41,37 @@ Array = npt.NDArray[Any]
 SPARE = 4
 
 
-@dataclass
-class Level:
-    """A problem on another mesh, or in another theory.
-
-    Attributes:
-        analysis: of the problem there.
-        error: difference of a frequency, relative ↦ its error.
-        weights: values at the nodes of the analysed mesh by those of this one; None on several processes.
-        before: solution at the speed before.
-    """
-
-    analysis: ModalAnalysis
-    error: Callable[[float], float]
-    weights: Any
-    before: Spinning | None = None
-
-
-@dataclass
-class Modes:
-    """Modes on another mesh, or in another theory.
-
-    Attributes:
-        speed: Ω, rad/s.
-        values: λ.
-        carried: their vectors at the nodes of the analysed mesh, without the hub; None on several processes.
-        error: see `Level`.
-    """
-
-    speed: float
-    values: Array
-    carried: Array | None
-    error: Callable[[float], float]
-
-
 class FrequencyErrors:
     """The errors of the frequencies of an analysis at any speed.
 
     Args:
         analysis: of the modes.
         richer: the problem in the theory that frequencies are compared with; None for the errors by the mesh.
+
+    Attributes:
+        there: analysis of the problem on another mesh or in that theory; None where there is nothing to compare with.
+        values: λ there, at the speed of the last call.
+        carried: their vectors at the nodes of the analysed mesh, without the hub; None on several processes.
     """
 
     def __init__(self, analysis: ModalAnalysis, richer: Problem | None = None):
         self.analysis, self.richer = analysis, richer
-        self._level: Level | None = None
-        self._modes: Modes | None = None
+        self.there: ModalAnalysis | None = None
+        self.values: Array = np.empty(0)
+        self.carried: Array | None = None
+        self._speed: float | None = None
+        self._before: Spinning | None = None
+        #: Values at the nodes of the analysed mesh by those of the other one; difference of a frequency ↦ its error.
+        self._weights: Any = None
+        self._error: Callable[[float], float] = float
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
         """Return the relative error of every eigenvalue; None where it is unknown."""
         lam = spinning.pairs.values
-        modes = self._at(spinning.speed, len(lam) + int(spinning.rigid)) if len(lam) else None
-        if modes is None:
+        if not len(lam) or not self._found(spinning.speed, len(lam) + int(spinning.rigid)):
             return [None] * len(lam)
-        differences = np.abs(self._matched(modes, spinning) - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
-        return [modes.error(float(d)) for d in differences]
+        differences = np.abs(self._matched(spinning) - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
+        return [self._error(float(d)) for d in differences]
 
     def near(self, speed: float, count: int) -> Array | None:
         """Return the modes on half the cells as columns of the analysed mesh, if it is large; its matrices are freed.
@@ -106,57 +81,55 @@ class FrequencyErrors:
             count: number of modes.
         """
         size = self.analysis.system.V.dofmap.index_map.size_global * self.analysis.structure.size
-        modes = self._at(speed, count) if size > SMALL else None
-        if modes is not None and modes.carried is not None:
-            self._level = None
-        return None if modes is None else modes.carried
-
-    def _at(self, speed: float, count: int) -> Modes | None:
-        """Return at least so many modes on the other mesh; None where there are none."""
-        if self._modes is not None and self._modes.speed == speed and len(self._modes.values) >= count:
-            return self._modes
-        level = self._level = self._level or self._made()
-        if level is None:
+        if size <= SMALL or not self._found(speed, count):
             return None
-        there = level.analysis
+        if self.carried is not None:
+            self.there = self._before = None
+        return self.carried
+
+    def _found(self, speed: float, count: int) -> bool:
+        """Find at least so many modes on the other mesh; return whether there are."""
+        if self._speed == speed and len(self.values) >= count:
+            return True
+        there = self.there = self.there or self._made()
+        self._speed = None
+        if there is None:
+            return False
         most = there.structure.free_unknowns() + int(there.free)
         try:
-            level.before = there.at(speed, min(count + SPARE, most), level.before, keep=False)
+            self._before = there.at(speed, min(count + SPARE, most), self._before, keep=False)
         except (ComputationError, InputError, np.linalg.LinAlgError):
-            return None
-        values, carried = level.before.pairs.values, None
-        if level.weights is not None:
-            shapes = there.right(level.before)[: level.weights.shape[1] * self.analysis.structure.size]
-            columns = shapes.reshape(level.weights.shape[1], -1)
-            carried = (level.weights @ columns).reshape(-1, shapes.shape[1])
-        self._modes = Modes(speed, values, carried, level.error) if len(values) + int(there.free) >= count else None
-        return self._modes
+            return False
+        self.values = self._before.pairs.values
+        if self._weights is not None:
+            shapes = there.right(self._before)[: self._weights.shape[1] * self.analysis.structure.size]
+            columns = shapes.reshape(self._weights.shape[1], -1)
+            self.carried = (self._weights @ columns).reshape(-1, shapes.shape[1])
+        if len(self.values) + int(there.free) < count:
+            return False
+        self._speed = speed
+        return True
 
-    @property
-    def there(self) -> ModalAnalysis | None:
-        """What the last frequencies were compared with; None where there is nothing."""
-        return None if self._level is None else self._level.analysis
-
-    def _made(self) -> Level | None:
+    def _made(self) -> ModalAnalysis | None:
         own = self.analysis
         system: Any = None
-        error: Callable[[float], float] = float
         if self.richer is None:
             other = on_other_mesh(own.problem, own.system, moving=False)
             if other is None:
                 return None
-            system, error = other.system, other.error
+            system, self._error = other.system, other.error
             problem = own.problem.replace(mesh=system.model.problem.mesh)
         else:
             problem = self.richer.replace(outputs={})
         there = ModalAnalysis(problem, own.about, own.newton, own.comm, system)
         there.past_limits = own.past_limits
-        nodes = own.system.V.tabulate_dof_coordinates()
-        return Level(there, error, interpolation(there.system.V, nodes) if own.comm.size == 1 else None)
+        if own.comm.size == 1:
+            self._weights = interpolation(there.system.V, own.system.V.tabulate_dof_coordinates())
+        return there
 
-    def _matched(self, modes: Modes, spinning: Spinning) -> Array:
+    def _matched(self, spinning: Spinning) -> Array:
         """Return for every mode the eigenvalue of the most similar one on another mesh."""
-        values, carried = modes.values, modes.carried
+        values, carried = self.values, self.carried
         apart = np.abs(values[None, :] - spinning.pairs.values[:, None])
         if carried is not None:
             alike = np.abs(self.analysis.mass_times(spinning)[: len(carried)].conj().T @ carried)
