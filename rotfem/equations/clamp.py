@@ -28,7 +28,7 @@ from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
-from rotfem.numerics import compat, forms
+from rotfem.numerics import forms
 from rotfem.numerics.forms import added
 from rotfem.numerics.projection import times
 from rotfem.structures.root_reaction import RootReaction
@@ -122,14 +122,16 @@ class ClampWork:
 
 
 def rows_times(A: Any, columns: Array) -> Array:
-    """Return Aᵀ times owned columns (n, m) of a PETSc matrix, owned rows; zero of None."""
-    out: Array = np.zeros_like(columns)
-    if A is not None:
-        x, y = A.createVecs()
-        for product, column in zip(out.T, columns.T, strict=True):
-            x.array[:] = column
-            A.multTranspose(x, y)
-            product[:] = y.array
+    """Return Aᵀ times owned columns (n, m) of a PETSc matrix, owned rows; zero of None, as of a square one."""
+    if A is None:
+        return np.zeros_like(columns)
+    y, x = A.createVecs()
+    out: Array = np.zeros((y.getLocalSize(), columns.shape[1]))
+    for product, column in zip(out.T, columns.T, strict=True):
+        x.array[:] = column
+        A.multTranspose(x, y)
+        moved = np.flatnonzero(y.array)  # few at a clamp; what is not written takes up no memory
+        product[moved] = y.array[moved]
     return out
 
 
@@ -140,8 +142,7 @@ class AtClamp:
     """Says what an operator, its clamp not held, does in the unit motions of the clamp, of this process."""
 
     def __init__(self, model: Model, clamped: npt.NDArray[Any], root: RootReaction):
-        self._model, self._V = model, model.structure.V
-        self._work = compat.create_vector(self._V)
+        self._model = model
         fixed = np.zeros((len(root.weights), 1), dtype=bool)
         fixed[clamped] = True
         self._motions = self._moved(np.where(fixed, root.weights, 0.0))
@@ -153,8 +154,9 @@ class AtClamp:
     def _moved(self, columns: Array) -> tuple[Any, Array]:
         """Return the rows that motions (owned rows, a column each) move, global numbers, and what these are there."""
         rows = np.flatnonzero(np.any(columns != 0.0, axis=1))
-        first = self._work.getOwnershipRange()[0]
-        return PETSc.IS().createGeneral((first + rows).astype(PETSc.IntType), comm=self._work.comm), columns[rows]
+        V = self._model.structure.V
+        numbers = V.dofmap.index_map.local_range[0] * V.dofmap.index_map_bs + rows
+        return PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=V.mesh.comm), columns[rows]
 
     def of_vector(self, b: Any) -> Array:
         """Return one number for each motion."""
@@ -163,24 +165,13 @@ class AtClamp:
 
     def of_matrix(self, A: Any, of: Collection[str]) -> Array:
         """Return a row for each owned unknown, of a matrix of some terms (see `Piece`)."""
+        # Only the rows of A that motions move are multiplied.
+        sign, (rows, motions) = 1.0, self._motions
         if any(self._model.acting[n].at_root for n in of if n in self._model.acting):
-            return -self._times(A, self._turns)
-        if EFFECT in of and self._others is not None:  # the hub takes up what strains do not (see `hub_damping`)
-            return -self._times(A, self._others)
-        return self._times(A, self._motions)
-
-    def _times(self, A: Any, moved: tuple[Any, Array]) -> Array:
-        """Return Aᵀ times motions, owned rows; only the rows of A that they move are multiplied."""
-        rows, motions = moved
-        there = A.createSubMatrix(rows)
-        motion = there.createVecs()[1]
-        out = np.zeros((len(self._work.array), motions.shape[1]))
-        for column, values in zip(out.T, motions.T, strict=True):
-            motion.array[:] = values
-            there.multTranspose(motion, self._work)
-            moved_rows = np.flatnonzero(self._work.array)  # few; what is not written takes up no memory
-            column[moved_rows] = self._work.array[moved_rows]
-        return out
+            sign, (rows, motions) = -1.0, self._turns
+        elif EFFECT in of and self._others is not None:  # the hub takes up what strains do not (see `hub_damping`)
+            sign, (rows, motions) = -1.0, self._others
+        return rows_times(A.createSubMatrix(rows), sign * motions)
 
 
 class ClampRows:

@@ -8,7 +8,6 @@ each cell; of a function of place the values at the nodes of the mesh.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,7 +70,10 @@ class SpanField(Amplitude):
         f = fem.Function(_space(structure, "DG", degree, n))
         cells, parts = f.function_space.dofmap.list, []
         for shapes in (term.shapes for term in load.terms):
-            at = partial(_columns, shapes, n)
+
+            def at(x: Array, near: Array, shapes: Shapes = shapes) -> Array:
+                return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
+
             values = SectionField(at, rows, degree).values(f.function_space).reshape(cells.size, -1, n)
             if shapes.region:
                 there = np.zeros(len(values), dtype=bool)
@@ -113,11 +115,6 @@ class SpanField(Amplitude):
         if turn is not None and n > 1:
             dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()
         self._function.x.array[:] = dofs
-
-
-def _columns(shapes: Shapes, n: int, x: Array, near: Array) -> Array:
-    """Return the first n components of all shapes at places (m), (places, shapes, n)."""
-    return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
 
 
 def first(values: Array, n: int) -> Array:

@@ -270,21 +270,3 @@ def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
             time,
             f"a smaller load, or {others}",
         )
-
-
-def check_directors(plate: Any, q: Array, time: float | None = None) -> None:
-    """Refuse a state in which the director of a plate has come to the pole of its angles.
-
-    Raises:
-        ComputationError: says how far it has come.
-    """
-    owned = plate.V.dofmap.index_map.size_local
-    tilt = np.abs(q[: plate.size * owned].reshape(-1, plate.size)[:, 4])
-    worst = plate.comm.allreduce(float(tilt.max(initial=0.0)), op=MPI.MAX)
-    if worst > DirectorTurns.limit:
-        raise ComputationError(
-            f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {DirectorTurns.limit}); in the "
-            f"theory {plate.problem.theory.name} the director's angles are limited there, not about direction 2",
-            time,
-            f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
-        )
