@@ -18,7 +18,7 @@ Array = npt.NDArray[Any]
 
 
 def mode_tables(
-    analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True, formats: tuple[str, ...] = ()
+    analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True, formats: tuple[str, ...] | None = None
 ) -> ModesResult:
     """Return the first modes at a speed, with warnings of the model and of instabilities.
 
@@ -27,7 +27,7 @@ def mode_tables(
         speed: rad/s.
         count: number of modes, that of a rigid body among them.
         keep: whether the matrices must outlast another solution.
-        formats: of the files for ParaView that are wanted.
+        formats: of the files for ParaView that are wanted; None of a structure that may have no surface.
 
     Raises:
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
@@ -55,7 +55,7 @@ def mode_tables(
         "warnings": warnings,
     }
     out = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
-    if shapes:
+    if shapes and formats is not None:
         out.surface = surface_of(structure, next(iter(shapes.values())))
         out.fields = modes_writer(analysis, out, scaled, formats)
     return out

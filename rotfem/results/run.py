@@ -63,6 +63,10 @@ class StationHistory:
         over: Variables = {name: (("t", "x"), values) for name, values in self.values.items()}
         return dataset(over, {"t": (("t",), self.t), "x": (("x",), self.x)}, {})
 
+    def text(self) -> str:
+        """Return the columns as CSV."""
+        return csv_text(self.columns())
+
     def write_hdf5(self, path: Path) -> Path:
         """Write t, x and the quantities as HDF5 datasets with their units; return the path.
 
@@ -159,9 +163,10 @@ class RunResult(Result):
     def texts(self) -> dict[str, str]:
         """Return history.csv, shape.csv, resultants.csv and stations.csv, as far as there is one."""
         tables = {"history.csv": self.history, "shape.csv": self.shape, "resultants.csv": self.resultants}
+        texts = {name: csv_text(columns) for name, columns in tables.items() if columns}
         if self.stations is not None and self.stations.format == "csv":
-            tables["stations.csv"] = self.stations.columns()
-        return {name: csv_text(columns) for name, columns in tables.items() if columns}
+            texts["stations.csv"] = self.stations.text()
+        return texts
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes stations.h5 and files for ParaView, where these are asked for."""
