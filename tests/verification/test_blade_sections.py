@@ -73,7 +73,7 @@ def test_matrices_by_tables() -> None:
     # Full matrices at the rows, linear between, as the reader of the file would have them; with a skew product of
     # inertia, and a moment J₁ that is not J₂ + J₃, as printed digits have it.
     at, section = matrices_of(blade(CENTRES))
-    rows = sorted({0.0, *section.breakpoints, 1.0})
+    rows = section.knots
     stiffness = [[x, at(x)["stiffness"]] for x in rows]
     mass = [[x, at(x)["mass"] + np.diag([0, 0, 0, 1e-6, 0, 0])] for x in rows]
     for _, M in mass:
