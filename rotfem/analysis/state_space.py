@@ -18,9 +18,10 @@ from scipy.sparse import csr_array, save_npz
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.modal_damping import KEY
-from rotfem.errors import InputError, OutputError, SceneError
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.errors import InputError, SceneError
+from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import PlusLowRank, sparse_part
+from rotfem.results.files import writing
 
 Array = npt.NDArray[Any]
 
@@ -57,11 +58,9 @@ class StateSpace:
         Raises:
             OutputError: it cannot be written.
         """
-        inputs, outputs = np.array(self.inputs), np.array(self.outputs)
-        try:
-            np.savez(path, A=self.A, B=self.B, C=self.C, D=self.D, inputs=inputs, outputs=outputs, speed=self.speed)
-        except OSError as error:
-            raise OutputError(path, error.strerror or str(error)) from None
+        arrays: dict[str, Any] = {name: np.array(value) for name, value in vars(self).items()}
+        with writing(path):
+            np.savez(path, **arrays)
         return path
 
 
@@ -94,22 +93,12 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
             columns.append(shape.real)
     A = block_diag(*blocks)
     B, C = np.array(rows), np.array(columns).T
-    D = tip_flexibility(analysis, spinning, tip) + C @ np.linalg.solve(A, B)
-    components = structure.components
-    outputs = tuple(f"tip_{name}" for name in components)
+    units = np.zeros((len(spinning.q), len(tip)))
+    units[tip, np.arange(len(tip))] = 1.0
+    flexibility = DirectSolver(spinning.pencil.K).solve_all(units)[tip]  # static answer to unit forces and moment
+    D = flexibility + C @ np.linalg.solve(A, B)
+    outputs = tuple(f"tip_{name}" for name in structure.components)
     return StateSpace(A, B, C, D, structure.tip_inputs, outputs, spinning.speed)
-
-
-def tip_flexibility(analysis: ModalAnalysis, spinning: Spinning, tip: Array) -> Array:
-    """Return the static answer of the tip (m, rad) to unit tip forces and moment, shape (components, inputs)."""
-    solver, dx = DirectSolver(spinning.pencil.K), Increment(analysis.system.V)
-    b = analysis.system.b.duplicate()
-    out = np.zeros((len(tip), len(tip)))
-    for i, dof in enumerate(tip):
-        b.zeroEntries()
-        b.array[dof] = 1.0
-        out[:, i] = dx.solve(solver, b)[tip]
-    return out
 
 
 def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) -> list[Path]:
@@ -123,11 +112,11 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
     serial(analysis, "the export of matrices")
     structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
-    paths = []
+    paths = [folder / f"{name}.{kind}" for name in "MCK" for kind in ("mtx", "npz")]
     if sparse_part(spinning.pencil.C) is not spinning.pencil.C and len(free) > FULL:
         why = f"C is full with damping by mode; it is written for up to {FULL} free unknowns, and here are {len(free)}"
         raise InputError(KEY, analysis.problem.structure.damping.modal, why)
-    try:
+    with writing(folder):
         for name in "MCK":
             A = getattr(spinning.pencil, name)
             sparse = sparse_part(A)
@@ -138,7 +127,6 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
                 matrix = csr_array(matrix.toarray() + A.added(np.eye(len(spinning.q))[:, free])[free])
             mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
             save_npz(folder / f"{name}.npz", matrix)
-            paths += [folder / f"{name}.mtx", folder / f"{name}.npz"]
         bs = len(structure.components)
         x = structure.V.tabulate_dof_coordinates()
         lines = ["row,x1,x2,x3,component"]
@@ -146,8 +134,6 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
             where = ",".join(repr(float(c)) for c in x[dof // bs])
             lines.append(f"{row},{where},{structure.components[dof % bs]}")
         (folder / "unknowns.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(folder, error.strerror or str(error)) from None
     return [*paths, folder / "unknowns.csv"]
 
 
