@@ -18,6 +18,7 @@ import numpy.typing as npt
 from dolfinx import fem, la
 from mpi4py import MPI
 
+from rotfem.equations.clamp import TurningClamp
 from rotfem.equations.functionals import Functionals
 from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
@@ -31,7 +32,6 @@ from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.projection import PlusLowRank
 from rotfem.structures.root_reaction import RootReaction
-from rotfem.structures.turning_clamp import TurningClamp
 
 Array = npt.NDArray[np.float64]
 

@@ -151,7 +151,9 @@ class Beam(Structure):
         """Return a discontinuous field of a degree (see `SectionField`), with so many components, a scalar for 0."""
         cell = self.mesh.basix_cell()
         space = fem.functionspace(self.mesh, element("DG", cell, degree, shape=(size,) if size else ()))
-        return SectionField(at, self.inner_rows, min(self.degree, degree), valid)(fem.Function(space, name=name))
+        f = fem.Function(space, name=name)
+        f.x.array[:] = SectionField(at, self.inner_rows, min(self.degree, degree), valid).values(space).ravel()
+        return f
 
     # --- values -------------------------------------------------------------------------------------------------
 

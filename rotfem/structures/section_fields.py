@@ -36,7 +36,7 @@ leggauss = cache(legendre.leggauss)
 
 @dataclass(frozen=True)
 class SectionField:
-    """Sets a discontinuous field on a mesh of a beam.
+    """A discontinuous field on a mesh of a beam.
 
     Attributes:
         at: (x, near), (n,) in m ↦ values (n,) or (n, components); near are on the side of x that counts at a jump.
@@ -50,11 +50,6 @@ class SectionField:
     rows: Array
     degree: int
     valid: Valid | None = None
-
-    def __call__(self, f: fem.Function) -> fem.Function:
-        """Set the field, and return it."""
-        f.x.array[:] = self.values(f.function_space).ravel()
-        return f
 
     def values(self, space: fem.FunctionSpace) -> Array:
         """Return the values at the nodes of a discontinuous space, (nodes, components)."""
