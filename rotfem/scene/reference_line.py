@@ -32,8 +32,10 @@ def as_line(value: Any) -> Matrix:
             raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
     line = ReferenceLine(rows)
     with np.errstate(all="ignore"):  # points whose distances are no numbers have no speed
-        # Near 1 where points follow each other, 0.7 at a corner of 90° without a kink, 0 where the line turns back.
-        if not line.slowest > 0.05:
+        # |dr/ds| over the lengths s of chords, sampled between the points: near 1 where points follow each other, 0.7
+        # at a corner of 90° without a kink, 0 where the line turns back.
+        samples = [(spline, np.linspace(spline.x[:-1], spline.x[1:], 65)) for _, spline in line._pieces]
+        if not np.min([np.min(np.linalg.norm(spline(s, 1), axis=-1)) for spline, s in samples]) > 0.05:
             why = "the line turns back on itself between two points; they must follow each other along it"
             raise problem("", None, why)
     along = np.linspace(0.0, line.length, 8 * len(rows) + 1)
@@ -91,15 +93,6 @@ class ReferenceLine:
         places = [start + np.cumsum(np.concatenate([[0.0], _lengths(spline)])) for start, spline in self._pieces]
         inner = np.unique(np.concatenate([p[:-1] for p in places]))
         return tuple(inner[1:].tolist())
-
-    @property
-    def slowest(self) -> float:
-        """Smallest speed |dr/ds| of the splines over the lengths s of their chords, sampled between all points."""
-        speeds = []
-        for _, spline in self._pieces:
-            samples = np.linspace(spline.x[:-1], spline.x[1:], 65)
-            speeds.append(np.min(np.linalg.norm(spline(samples, 1), axis=-1)))
-        return float(np.min(speeds))
 
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
         """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) in m.

@@ -268,10 +268,9 @@ class Block:
 
 
 def _is_htc(deck: Deck) -> bool:
-    """Return whether there is a main body."""
-    return any(line.lower().split(";")[0].split()[:2] == ["begin", "main_body"] for line in deck.lines) or any(
-        line.lower().split()[:1] == ["continue_in_file"] for line in deck.lines
-    )
+    """Return whether there is a main body, or another file that may have one."""
+    words = (line.lower().split(";")[0].split() for line in deck.lines)
+    return any(each[:2] == ["begin", "main_body"] or each[:1] == ["continue_in_file"] for each in words)
 
 
 def _main_body(deck: Deck, wanted: str | None) -> Block:
