@@ -355,9 +355,9 @@ class ErrorMeasure:
         return x
 
 
-#: Switches in so many steps that are a sliding mode. Steps that have passed a switch grow for tens of steps before
-#: there is another one to be found; in a sliding mode one in two or three has one.
-SWITCHES, STEPS = 50, 200
+#: Switches back in the very next step, and steps tried meanwhile, that are a sliding mode. A switch that the motion
+#: passes is not taken back at once: steps grow for tens of steps before there is another one to be found.
+RETURNS, STEPS = 20, 2000
 
 #: What to do where there is one.
 SMOOTHER = (
@@ -380,23 +380,25 @@ class Switches:
 
     def __init__(self, system: Any):
         self.system, self.torque = system, system.hub.torque
-        self._passed: deque[tuple[int, float]] = deque(maxlen=SWITCHES)
+        self._returns: deque[tuple[int, float]] = deque(maxlen=RETURNS)
+        self._switched = False
 
     def passed(self, number: int, old: State, new: State) -> None:
         """Take note of a step.
 
         Raises:
-            ComputationError: it is one of many in a row with a switch in it.
+            ComputationError: it is one of many that take the switch of the step before it back.
         """
-        if not self.between(self._seen(old), self._seen(new)):
+        before, self._switched = self._switched, self.between(self._seen(old), self._seen(new))
+        if not (before and self._switched):
             return
-        self._passed.append((number, new.t))
-        first, since = self._passed[0]
-        if len(self._passed) < SWITCHES or number - first > STEPS:
+        self._returns.append((number, new.t))
+        first, since = self._returns[0]
+        if len(self._returns) < RETURNS or number - first > STEPS:
             return
         what = (
-            f"the torque has switched in {SWITCHES} of the last {number - first + 1} steps, of "
-            f"{(new.t - since) / (number - first):.3g} s on average: it holds the motion at its own jump (sliding mode)"
+            f"the torque has switched back at once {RETURNS} times in the last {new.t - since:.3g} s, which took "
+            f"{number - first} steps: it holds the motion at its own jump (sliding mode)"
         )
         raise ComputationError(what, time=new.t, advice=SMOOTHER)
 

@@ -76,6 +76,15 @@ def test_a_relay_that_holds_the_hub_at_its_jump_has_no_steps() -> None:
         rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "step": 0.05}})
 
 
+def test_a_relay_that_holds_a_soft_beam_half_way_has_no_steps() -> None:
+    """Where the mean torque that holds the hub is near one of the two, one step in ten has a switch."""
+    scene = relay(50.0, -50.0, 0.2)
+    scene["structure"]["section"] = SECTION | {"EI": 1.4e4}
+    scene["motion"]["hub_inertia"] = 100.0
+    with pytest.raises(rotfem.ComputationError, match="sliding mode"):
+        rotfem.run({**scene, "model": {"theory": "reissner"}, "time": {"end": 1.8, "tolerance": 1e-4}})
+
+
 def test_a_relay_that_is_passed_is_no_hindrance() -> None:
     """I Ω̇ = M, then 3M/2: two straight lines, but for the vibration (0.08 rad/s) that the sudden start leaves."""
     M, wanted = 400.0, 0.5
