@@ -262,7 +262,7 @@ def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
     worst = int(np.argmax(turns))
     if turns[worst] > turned.FULL_TURN:
         theory = beam.problem.theory
-        limited = "behind a hinge" if theory.exact else f"in the theory {theory.name}"
+        limited = "behind more than one hinge" if theory.exact else f"in the theory {theory.name}"
         others = "a spring or a damper at the root" if theory.exact else f'model.theory = "{richest().name}"'
         raise ComputationError(
             f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns "

@@ -200,8 +200,9 @@ class SpatialBeam(Beam):
             self._root = ufl.as_vector(parts)
         self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
-        whole = self.size == len(self.components) and not self.released  # whose turns are counted from the hub
-        self.turns = SectionTurns.of(self) if whole else None
+        # behind one hinge turns add up; behind two or three the clamp is one of turns from the hub
+        counted = self.size == len(self.components) and len(self.released) <= 1
+        self.turns = SectionTurns.of(self) if counted else None
 
     @classmethod
     def is_symmetric(cls, data: Any, normal: int) -> bool:
@@ -335,7 +336,7 @@ class SpatialBeam(Beam):
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""
-        theta, e = rotation_part(self.k.q), self._root_axes[axis - 1]
+        theta, e = self._total_rotation(), self._root_axes[axis - 1]
         return sum(e[i] * theta[i] for i in range(3))
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
@@ -416,11 +417,15 @@ class SpatialBeam(Beam):
 
     def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
         """Return the work of a moment on the turns of the sections; a follower turns with Λ."""
-        theta = self._turn.theta
-        if self.turns is not None and self.turns.before is not None:
-            theta = theta + rotation_part(self.turns.before)
         M = m if dead else self.turned(self.k.q, m)
-        return [AppliedMoment(name, M, theta, measure, dead, section=self._turn)]
+        return [AppliedMoment(name, M, self._total_rotation(), measure, dead, section=self._turn)]
+
+    def _total_rotation(self) -> Any:
+        """Return θ, counted from the reference, and the total rotation vector of the reference."""
+        theta = self._turn.theta
+        if self.turns is None or self.turns.before is None:
+            return theta
+        return theta + rotation_part(self.turns.before)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state in which some section has turned by more than a turn, where that has no reference.

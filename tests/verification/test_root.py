@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, expm
 from scipy.optimize import brentq
 
@@ -85,6 +86,27 @@ def test_damped_spring_in_time_and_the_moment_of_the_hub(theory: str) -> None:
     history = rotfem.run(tables).history
     assert history["tip_alpha"][-1] == pytest.approx(angle, rel=5e-4)
     assert history["root_m3"][-1] == pytest.approx(-k * angle - c * rate, rel=5e-4)
+
+
+@pytest.mark.parametrize(("k", "c"), [(0.0, 0.0), (1000.0, 100.0)])
+def test_a_blade_thrown_right_over_its_flap_hinge(k: float, c: float) -> None:
+    """I (β̈ + Ω² sin β cos β) + c β̇ + k β = 0 beyond a whole turn, of a rigid blade; the hub exerts k β + c β̇."""
+    speed, rate, inertia = SPIN["speed"], 20.0, RHO * L**3 / 3
+    stiffer = {key: value if key == "mass_per_length" else 100 * value for key, value in SPATIAL_SECTION.items()}
+    blade = {**SPATIAL, "section": stiffer, "root": {"flap_stiffness": k, "flap_damping": c}}
+    thrown = {"velocity": [[0, 0, 0, 0], [L, 0, 0, rate * L]]}
+    time = {"end": 0.5, "step": 2e-3, "scheme": "esdirk4"}
+    tables = {"structure": blade, "motion": SPIN, "initial": thrown, "mesh": {"elements": 2}, "time": time}
+    found = rotfem.run({**tables, "output": {"error": False}})
+
+    def rates(_: float, y: Any) -> list[float]:
+        return [y[1], -(speed**2) * np.sin(y[0]) * np.cos(y[0]) - (c * y[1] + k * y[0]) / inertia]
+
+    exact = solve_ivp(rates, (0, 0.5), [0.0, rate], t_eval=found.t, rtol=1e-10, atol=1e-10).y
+    assert exact[0].max() > 2.4 * np.pi
+    np.testing.assert_allclose(found.tip["u3"], L * np.sin(exact[0]), rtol=0, atol=2e-3 * L)
+    moment = k * exact[0] + c * exact[1]
+    np.testing.assert_allclose(found.column("root_m2"), moment, rtol=0, atol=2e-2 * max(moment.max(), 1.0))
 
 
 def test_root_moment_of_a_spring_at_rest() -> None:
