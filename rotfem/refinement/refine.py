@@ -7,8 +7,9 @@ contribution of steps or mesh and s what it may be, the next answer has
 
 n the number of elements of degree k; a model whose own error is too large gives way to the next richer one. The loop
 ends with the first answer whose error is within the accuracy, or where nothing left to refine would help, or where the
-next answer would take more than what is left of a budget. What one took, and how its work grows, says what the next
-one takes.
+next answer would take more than what is left of a budget. A finer setting that gives the same answer is the last, too:
+steps are no more exact than the increments of Newton's method. What one took, and how its work grows, says what the
+next one takes.
 """
 
 from __future__ import annotations
@@ -373,8 +374,12 @@ def refine(
             continue
         answer = Answer(setting, error, clock.used() - began, result)
         found.tried.append({**setting.summary(), "error": error["total"], "seconds": answer.seconds})
+        same = found.best is not None and is_known(error) and error == found.best.error
         if found.best is None or answer.rank <= found.best.rank:
             found.best = answer
-        if not is_within(error, accuracy):
+        if same and not is_within(error, accuracy):
+            what = "a finer setting gave the same answer"
+            found.failure = ComputationError(what, advice="a looser accuracy, or a smaller solver.increment_tolerance")
+        elif not is_within(error, accuracy):
             following = clock.comm.bcast(setting.finer(error, accuracy))
     return found

@@ -190,6 +190,15 @@ def test_an_answer_that_is_too_dear_ends_while_it_goes_on(monkeypatch: pytest.Mo
     assert now[0] < 20.0
 
 
+def test_a_finer_setting_that_changes_nothing_is_the_last() -> None:
+    """Steps below what Newton's increments allow are all the same: what that says is said, and no third is computed."""
+    asked, attempt = attempts(result(2e-3), result(2e-3))
+    with pytest.raises(Missed, match="a finer setting gave the same answer") as caught:
+        to_accuracy(SCENE, SETTING, attempt, clock())
+    assert len(asked) == 2
+    assert "solver.increment_tolerance" in caught.value.advice
+
+
 def test_answers_end() -> None:
     """Each three quarters of the one before: never met."""
     asked, attempt = attempts(*(result(0.75**i) for i in range(2 * MOST)))
