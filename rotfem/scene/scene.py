@@ -76,7 +76,7 @@ class Scene(SceneModel):
         limits: how much may be asked for.
         extensions: Python files that register what the scene names.
         accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,
-            effects, mesh, scheme and step follow from it.
+            mesh, scheme and step follow from it.
         accuracy_of: what it is the accuracy of; if not given, what a command computes first of all.
         accuracy_budget: CPU time (s) that it may take, without a limit if not given.
     """
