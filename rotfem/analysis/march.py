@@ -315,7 +315,7 @@ class ErrorMeasure:
             while len(self._kept) >= 4:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[length] = self._made(COARSE**length)
-        # what is not resolved is off by up to 2 A, of which A/2 may remain
+        # what is not resolved is in error by up to 2 A, of which A/2 may remain
         adds_up, remains = (self.size(self._through(error, filters)) for filters in self._kept[length])
         return max(self.end / h * adds_up, 3.0 * remains)
 

@@ -76,8 +76,8 @@ class Resultants:
 
     def _at_rest(self, form: Any) -> Any:
         q, v, a, _ = self.model.mechanics.k.functions
-        gone = (q, v, a) if self.system.linear else (v, a)
-        return forms.without(form, *gone)
+        zero = (q, v, a) if self.system.linear else (v, a)
+        return forms.without(form, *zero)
 
     def _compile(self, strain: Any) -> tuple[Any, Any]:
         """Return the forms of R_C and W_C of one strain."""

@@ -236,7 +236,7 @@ class Stepper:
         if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
             if halvings > 0:
                 raise failure
-            advice = 'a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then'
+            advice = 'a smaller time.step, time.scheme = "energy_conserving", or check load and speed then'
             raise ComputationError(f"{failure.what} (the step was cut down to {h:.3g} s)", failure.time, advice)
         self.substeps += 1
         middle = self.advance(state, h / 2, None, halvings - 1)

@@ -244,7 +244,7 @@ class Farthest:
         self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
 
     def __call__(self, q: Array, t: float) -> None:
-        """Look at a state (local dof array) of time t (s)."""
+        """Take note of a state (local dof array) of time t (s)."""
         if not self.system.linear:
             return
         size = float(np.max(self.system.sizes(q), initial=0.0))

@@ -95,11 +95,11 @@ class TimeGrid:
                 stops = [last]
             lined = len(stops) <= len(inside)
             for stop in stops:
-                gone = stop - begin  # of one length to the last digit, so that the matrix stays
-                if abs(gone - self.step) <= close:
+                taken = stop - begin  # of one length to the last digit, so that the matrix stays
+                if abs(taken - self.step) <= close:
                     length = self.step
-                elif abs(gone - length) > close:
-                    length = gone
+                elif abs(taken - length) > close:
+                    length = taken
                 yield Leg(stop, length, lands or stop != last, (begin, stop) if lined else None, stop == last)
                 begin = stop
 

@@ -50,19 +50,9 @@ class Followed:
     steps: tuple[tuple[State, State], ...]
 
     @property
-    def start(self) -> State:
-        """State that the first starts from."""
-        return self.steps[0][0]
-
-    @property
     def end(self) -> State:
         """State that the last ends in."""
         return self.steps[-1][1]
-
-    @property
-    def doubled(self) -> bool:
-        """Whether there are two."""
-        return len(self.steps) > 1
 
     def state_at(self, t: float, order: int, comm: MPI.Comm) -> State:
         """Return the state at a time (s) as a row of a history has it."""
@@ -127,7 +117,7 @@ class FollowingStepper(Stepper):
             return
         self.followed, self._there = step, self.carried(step.end.q)
         if not self.differences:
-            self.differences = [(state.t, state.q - self.carried(step.start.q))]
+            self.differences = [(state.t, state.q - self.carried(step.steps[0][0].q))]
 
     def arrived(self, state: State) -> None:
         """Take note of the difference at the end of the step that was followed."""
@@ -234,7 +224,7 @@ class Companion:
     def _arrived(self, step: Followed, old: State, new: State, leg: Leg) -> None:
         """Compare the outputs at the end of a step and within it, and pass it on."""
         self.stepper.arrived(new)
-        self.doubled += leg.length if step.doubled else 0.0
+        self.doubled += leg.length if len(step.steps) > 1 else 0.0
         self._compare(new, step.end)
         if self.interval is not None:
             row = round((old.t + new.t) / (2 * self.interval)) * self.interval

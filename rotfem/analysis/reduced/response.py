@@ -148,9 +148,9 @@ def reduced_response(
             break
     out = Response(model, equations, times, solution, states, tips, basis_error, time_error, rounds, {})
     if foreshortening:
-        manifold, beside = Manifold(model, states[0]), copy(equations)
-        beside.further = equations.second_order(manifold, solution)
-        bent = solved(beside)[1][0]
+        manifold, bending = Manifold(model, states[0]), copy(equations)
+        bending.further = equations.second_order(manifold, solution)
+        bent = solved(bending)[1][0]
         found = manifold.tip(bent)
         out = replace(out, manifold=manifold, bent=bent, tips=found, foreshortening=difference(found, tips))
     return replace(out, seconds={"cpu": process_time() - began[0], "wall": perf_counter() - began[1]})
