@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import rotfem
@@ -50,18 +50,18 @@ def marched(scene: dict[str, Any], elements: int, steps: int, scheme: str, degre
     tables = {"mesh": {"elements": elements, "degree": degree}, "time": {"end": 20.0, "step": 20.0 / steps}}
     system = Problem.of(scene | tables).system()
     march = March(system, schemes[scheme](), Steps(20.0, 20.0 / steps), Newton())
-    started = perf_counter()
+    started = process_time()
     rows = [[state.t, *map(float, system.tip(state.q, state.t)[:3])] for state in march]
-    return perf_counter() - started, rows
+    return process_time() - started, rows
 
 
 def accuracy(wanted: float) -> tuple[float, Values]:
     """Run with `accuracy` alone, its choice of mesh, scheme and steps included; rows as above."""
     tables = {"time": {"end": 20.0, "step": 0.5}, "accuracy": wanted}
-    started = perf_counter()
+    started = process_time()
     history = rotfem.run(SPIN_UP | tables).history
     rows = [[float(t), float(u)] for t, u in zip(history["t"], history["tip_u2"], strict=True)]
-    return perf_counter() - started, rows
+    return process_time() - started, rows
 
 
 def lag(elements: int, speeds: list[float]) -> tuple[float, Values]:
@@ -99,9 +99,9 @@ def blade(main: str, elements: int, speeds: list[float]) -> tuple[float, Values]
 
 def diagram(tables: dict[str, Any], speeds: list[float], count: int) -> tuple[float, Values]:
     """Return seconds of a Campbell diagram, and its frequencies (rad/s)."""
-    started = perf_counter()
+    started = process_time()
     result = rotfem.campbell(tables, speeds, orders=0)
-    seconds = perf_counter() - started
+    seconds = process_time() - started
     rows = [[row["frequency"] for row in result.rows if row["speed"] == speed] for speed in speeds]
     return seconds, [sorted(row)[:count] for row in rows]
 

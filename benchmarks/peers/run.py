@@ -4,9 +4,9 @@
 
 The other programs are installed from PyPI into an environment of their own, `peers` in the cache folder. Every
 repetition of a case runs each program once, in a process of its own, one thread; in it the case runs twice, and the
-second time is measured: of histories the time loop, of frequencies all of it. Errors are relative: of a history the
-largest of the tip's u₂ over the instants of the table by the largest |u₂|, of frequencies the largest one at the
-first and the last speed. References share no code with any of the programs (`tests/reference`); for the blade it
+second time is measured, in CPU time: of histories the time loop, of frequencies all of it. Errors are relative: of a
+history the largest of the tip's u₂ over the instants of the table by the largest |u₂|, of frequencies the largest one
+at the first and the last speed. References share no code with any of the programs (`tests/reference`); for the blade it
 is pyBModes with 800 elements (`docs/blades.md`). What each program is given (mesh, steps, tolerance) is in `CASES`:
 by trial, the cheapest that meets the error in the case's name, of frequencies about one error for both.
 """
@@ -193,7 +193,7 @@ def draw(results: dict[str, dict[str, Measured]], path: Path) -> None:
         for y, seconds, label in bars:
             axis.annotate(label, (seconds, y), xytext=(3, 0), textcoords="offset points", va="center", fontsize=7)
     axis.set_yticks(range(len(results)), list(results))
-    axis.set(xscale="log", xlabel="least seconds; the number is the error")
+    axis.set(xscale="log", xlabel="least CPU seconds; the number is the error")
     axis.invert_yaxis()
     axis.legend(fontsize=8)
     figure.tight_layout()
@@ -209,7 +209,7 @@ def main() -> None:
     given = parser.parse_args()
     missing, results = install(), {}
     print(f"{date.today()}, {platform.processor() or platform.machine()}, {os.cpu_count()} cores, one thread\n")
-    print("| case | program | least s | median s | error | rotfem / it |\n|---|---|---|---|---|---|")
+    print("| case | program | least CPU s | median CPU s | error | rotfem / it |\n|---|---|---|---|---|---|")
     rows: list[dict[str, Any]] = []
     for case in given.case:
         results[case] = measure(case, given.repetitions, missing)
