@@ -160,7 +160,9 @@ class ReducedAnalysis(ModalAnalysis):
             low, high = gaps.pop(0)
             middle = 0.5 * (low + high)
             exact = self._solve(middle, count)
-            error = self._difference(middle, exact, count)
+            found = self.at(middle, count).pairs.values
+            n = min(count, len(found), len(exact.values))
+            error = float(np.max(np.abs(found[:n] - exact.values[:n]) / np.abs(exact.values[:n]), initial=0.0))
             self.checks.append({"speed": middle, "difference": error})
             self._add(exact)
             self._project()
@@ -176,11 +178,6 @@ class ReducedAnalysis(ModalAnalysis):
         for name, value in exact.pencil.asymmetries.items():
             self._asymmetries[name] = max(value, self._asymmetries.get(name, 0.0))
         return exact.pairs
-
-    def _difference(self, speed: float, exact: Eigenpairs, count: int) -> float:
-        reduced = self.at(speed, count).pairs.values
-        n = min(count, len(reduced), len(exact.values))
-        return float(np.max(np.abs(reduced[:n] - exact.values[:n]) / np.abs(exact.values[:n]), initial=0.0))
 
     def _add(self, pairs: Eigenpairs) -> None:
         for x in pairs.right.T:

@@ -302,7 +302,8 @@ def record_rows(response: Response, record: Recorder, monitor: Monitor) -> None:
     Energies and forces at the root are those of the linear theory; tip and fields have the foreshortening, if that is
     wanted.
     """
-    system, model, turn = record.system, response.model, response.turn
+    system, model = record.system, response.model
+    turn = response.equations.turn(response.times, response.solution)  # angle, speed and its rate
     given = None if system.hub is None else response.equations.given(response.solution, response.times)
     for i, t in enumerate(map(float, response.times)):
         q, v, a = (model.V @ x[i] for x in response.states)

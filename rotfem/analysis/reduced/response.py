@@ -67,11 +67,6 @@ class Response:
     bent: Array | None = None
     foreshortening: float | None = None
 
-    @property
-    def turn(self) -> Array:
-        """Angle (rad), speed and its rate of the frame in all rows, (n, 3)."""
-        return np.asarray(self.equations.turn(self.times, self.solution))
-
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
         out = {
