@@ -30,13 +30,13 @@ def with_ghosts(V: fem.FunctionSpace, owned: Array) -> Array:
     """Return local dof arrays, (n,) or (n, k), of owned rows: with those of other processes that are seen here."""
     if V.mesh.comm.size == 1:
         return owned
-    function, columns = fem.Function(V), owned.reshape(len(owned), -1)
+    function, columns = fem.Function(V), owned if owned.ndim > 1 else owned[:, None]
     out = np.empty((len(function.x.array), columns.shape[1]))
     for column, x in zip(out.T, columns.T, strict=True):
         function.x.array[: len(x)] = x
         function.x.scatter_forward()
         column[:] = function.x.array
-    return out.reshape(-1, *owned.shape[1:])
+    return out if owned.ndim > 1 else out[:, 0]
 
 
 def times(A: Any, X: Array) -> Array:
