@@ -74,7 +74,7 @@ def mode_rows(
     rows, pairs, described = [], spinning.pairs, analysis.described(spinning)
     names, waves = distinct(described.names), described.waves
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
-        size = abs(lam)
+        size = abs(lam) if bound < 1.0 else 0.0  # else λ is zero to round-off, whose sign is no damping
         rows.append(
             {
                 "mode": i + 1,
@@ -82,7 +82,7 @@ def mode_rows(
                 "name": engineers_name(names[i]),
                 "frequency": float(lam.imag),
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
-                "damping": float(-lam.real / size) if size > 0 else 0.0,
+                "damping": float(-lam.real / size) if size > 0.0 else 0.0,
                 "growth": float(lam.real),
                 "stability": stability(lam, float(bound)),
                 **{f"share_{name}": float(share[i]) for name, share in described.shares.items()},
