@@ -56,7 +56,7 @@ def exchanges(result: CampbellResult) -> int:
 
 
 def test_a_basis_of_modes_gives_what_full_solutions_do(unit_beam: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Through a veering, frequencies and names; to 1e-8, as the basis has a solution more than when it met 1e-6."""
+    """Through a veering, frequencies and names; to 1e-7, as the basis has a solution more than when it met 1e-6."""
     beam, speeds = scene(unit_beam, "von_karman_linear", 25, 0.0), [5.0 * i for i in range(13)]
     quick = campbell(beam, speeds)
     monkeypatch.setattr("rotfem.analysis.reduced_basis.MANY", len(speeds) + 1)
@@ -65,7 +65,7 @@ def test_a_basis_of_modes_gives_what_full_solutions_do(unit_beam: Any, monkeypat
     assert "reduced_basis" not in full.summary
     assert [row["label"] for row in quick.rows] == [row["label"] for row in full.rows]
     for name in ("speed", "frequency"):
-        np.testing.assert_allclose([r[name] for r in quick.rows], [r[name] for r in full.rows], rtol=1e-8)
+        np.testing.assert_allclose([r[name] for r in quick.rows], [r[name] for r in full.rows], rtol=1e-7)
 
 
 def test_digits_that_the_mixed_form_keeps_are_kept_at_many_speeds(unit_beam: Any) -> None:
