@@ -17,7 +17,7 @@ from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Levels, Row, covering, missing
 from tests.pairs.refusals import REFUSALS, WHOLE
-from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, as_toml, shuffled, tables_of
+from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, TOLERANCE, as_toml, shuffled, tables_of
 
 #: What no row has.
 CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *WHOLE]
@@ -25,7 +25,7 @@ CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *WHOLE]
 PATIENCE = 180.0
 #: Error of an answer on two processes: of sums in another order and Newton's last increment, of adaptive steps, which
 #: may be others then, and of what is computed to an accuracy.
-DIGITS = {"tolerance": 1e-3, "accuracy": 0.8}
+DIGITS = {"tolerance": TOLERANCE, "accuracy": 0.8}
 
 
 def name_of(row: Row) -> str:
