@@ -447,10 +447,10 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
                 done = work()
             except (OutputError, SceneError) as error:
                 problem = error
-        told, problem = self.comm.bcast((done if shared else None, problem))
+        found, problem = self.comm.bcast((done if shared else None, problem))
         if problem is not None:
             raise problem
-        return told if shared else done
+        return found if shared else done
 
     def write(self, result: Result, plots: bool, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
         """Write a result, small files first and large ones last; return what went wrong with the large ones.

@@ -339,7 +339,7 @@ def _with_length(data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, 
     try:
         arc = line_through(as_line(rows)).length
     except PydanticCustomError:
-        return {**data, "length": 1.0}  # what is wrong with the line is said at its key
+        return {**data, "length": 1.0}  # the error of the line is reported at its key
     given = Unit("m").read(data.get("length", arc))
     if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > DIGITS * arc:
         raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")

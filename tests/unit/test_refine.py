@@ -191,7 +191,7 @@ def test_an_answer_that_is_too_dear_ends_while_it_goes_on(monkeypatch: pytest.Mo
 
 
 def test_a_finer_setting_that_changes_nothing_is_the_last() -> None:
-    """Steps below what Newton's increments allow are all the same: what that says is said, and no third is computed."""
+    """Steps below what Newton's increments allow are all the same: the failure names them, and no third is computed."""
     asked, attempt = attempts(result(2e-3), result(2e-3))
     with pytest.raises(Missed, match="a finer setting gave the same answer") as caught:
         to_accuracy(SCENE, SETTING, attempt, clock())
