@@ -42,7 +42,7 @@ SPAR = {
     },
 }
 PANEL = {"type": "plate", "length": 0.8, "width": 0.3, "thickness": 0.006, "E": 7.0e10, "nu": 0.3, "rho": 2700.0}
-PANEL = {"type": "plate", "length": 0.7, "width": 0.35, "thickness": 0.005, "E": 71e9, "nu": 0.33, "rho": 2780.0}
+FOIL = {"type": "plate", "length": 0.7, "width": 0.35, "thickness": 0.005, "E": 71e9, "nu": 0.33, "rho": 2780.0}
 CANE = {"EA": 3.0e6, "GA": 9e5, "EI": 900.0, "mass_per_length": 0.55, "rotary_inertia": 1.2e-4}
 FLAPPING = {
     "EA": 26000000.0,
@@ -351,21 +351,21 @@ LAST: dict[str, Tables] = {
         "time": {"end": 1.2, "step": 0.01},
     },
     "sheet pushed at the tip": {
-        "structure": PANEL,
+        "structure": FOIL,
         "motion": {"type": "constant", "speed": 0.0},
         "loads": {"tip_force": [[0, 0, 0, 0], [0.03, 0, 0, 2.0], [0.08, 0, 0, 2.0], [0.1, 0, 0, 0]]},
         "mesh": {"elements": [4, 2]},
         "time": {"end": 0.25, "step": 0.0025},
     },
     "sheet by a table, von Karman": {
-        "structure": {**PANEL, "hub_radius": 0.15},
+        "structure": {**FOIL, "hub_radius": 0.15},
         "motion": {"type": "table", "table": [[0, 5.0], [0.1, 25.0], [0.25, 25.0]], "axis": [0, 1, 0]},
         "model": {"theory": "von_karman"},
         "mesh": {"elements": [5, 3]},
         "time": {"end": 0.3, "step": 0.003},
     },
     "sheet, follower pressure, esdirk4": {
-        "structure": {**PANEL, "damping": {"rayleigh": [5.0, 0.0]}},
+        "structure": {**FOIL, "damping": {"rayleigh": [5.0, 0.0]}},
         "motion": {"type": "constant", "speed": 10.0, "axis": [0, 0, 1]},
         "loads": {"pressure": {"over_time": [[0, 0], [0.06, 40.0], [0.15, 10.0], [0.3, 10.0]], "kind": "follower"}},
         "mesh": {"elements": [4, 3]},
