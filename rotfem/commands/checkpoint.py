@@ -1,9 +1,9 @@
 """What a run must know to go on as if it had never ended, taken out of its objects and put back into them.
 
 Numbers that the stepper and Newton's method have learnt are all their attributes but the parts that a run makes anew;
-unknowns are kept in the common order of nodes, so that any number of processes may go on. A kept factor is that of a
-tangent at a state, which is kept in its place. A sum protects the file from chance only: before anything is put back
-its tree is compared with that which the run itself would write.
+of a shared mesh each process keeps its own arrays. A kept factor is that of a tangent at a state, which is kept in its
+place. A sum protects the file from chance only: before anything is put back its tree is compared with that which the
+run itself would write.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cached_property
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
@@ -21,6 +21,7 @@ from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
@@ -31,7 +32,6 @@ from rotfem.errors import SceneError
 from rotfem.refinement.companion import Companion, Followed
 from rotfem.refinement.refine import Setting
 from rotfem.scene import Scene, Time
-from rotfem.structures.numbering import Numbering
 from rotfem.structures.reference_rotation import ReferenceRotation
 from rotfem.version import versions
 
@@ -49,7 +49,8 @@ Tree = dict[str, Any]
 PARTS: dict[str, Any] = {
     **dict.fromkeys(("identity", "versions", "state", "stepper", "log", "monitor", "every"), dict),
     **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "settings"), (dict, NoneType)),
-    **dict.fromkeys(("positions", "rows"), np.ndarray),
+    "positions": (np.ndarray, dict),
+    "rows": np.ndarray,
     **dict.fromkeys(("t", "elapsed"), float),
     "given": (np.ndarray, NoneType),
     "factorisations": int,
@@ -132,49 +133,40 @@ def check_parts(tree: Tree) -> None:
         alike(vars(Setting((), None, 0)) | known, settings, "settings")
 
 
-class Packing:
-    """Trees with arrays over a mesh, in an order that any number of processes knows.
+def packed(comm: MPI.Comm, value: Any) -> Any:
+    """Return a tree with the arrays of all processes that share a mesh, on rank 0; all of them come here together."""
+    if isinstance(value, np.ndarray) and comm.size > 1:
+        return {"kind": "parts", "values": comm.gather(value)}
+    if isinstance(value, dict):
+        return {"kind": "dict", "values": {k: packed(comm, v) for k, v in value.items()}}
+    if isinstance(value, list | tuple):
+        return type(value)(packed(comm, v) for v in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        values = {f.name: packed(comm, getattr(value, f.name)) for f in fields(value)}
+        return {"kind": f"{type(value).__module__}:{type(value).__qualname__}", "values": values}
+    return value
 
-    Args:
-        numbering: of the mesh.
-    """
 
-    def __init__(self, numbering: Numbering):
-        self.numbering = numbering
-
-    def packed(self, value: Any) -> Any:
-        """Return a tree with the arrays over the mesh in the common order; all processes come here together."""
-        if isinstance(value, np.ndarray) and value.ndim and (kind := self.numbering.kind(value)):
-            return {"kind": kind, "values": self.numbering.gather(value, kind)}
-        if isinstance(value, dict):
-            return {"kind": "dict", "values": {k: self.packed(v) for k, v in value.items()}}
-        if isinstance(value, list | tuple):
-            return type(value)(self.packed(v) for v in value)
-        if is_dataclass(value) and not isinstance(value, type):
-            values = {f.name: self.packed(getattr(value, f.name)) for f in fields(value)}
-            return {"kind": f"{type(value).__module__}:{type(value).__qualname__}", "values": values}
+def unpacked(comm: MPI.Comm, value: Any) -> Any:
+    """Return a tree with the arrays of this process."""
+    if isinstance(value, np.ndarray) and value.dtype.kind not in "biuf":
+        raise ValueError(f"an array of {value.dtype}")
+    if isinstance(value, list | tuple):
+        return type(value)(unpacked(comm, v) for v in value)
+    if not isinstance(value, dict):
         return value
-
-    def unpacked(self, value: Any) -> Any:
-        """Return a tree with the arrays of this process."""
-        if isinstance(value, list | tuple):
-            return type(value)(self.unpacked(v) for v in value)
-        if not isinstance(value, dict):
-            return value
-        kind, values = value["kind"], value["values"]
-        if len(value) != 2 or not isinstance(kind, str):
-            raise ValueError("kind")
-        if kind == "dict":
-            return {k: self.unpacked(v) for k, v in values.items()}
-        if ":" in kind:
-            record = record_of(kind)(**{k: self.unpacked(v) for k, v in values.items()})
-            for name, hint in get_type_hints(type(record)).items():
-                if not suits(getattr(record, name), hint):
-                    raise TypeError(f"{name} of {type(record).__name__}")
-            return record
-        if values.shape[:1] != (self.numbering.count(kind),) or values.dtype.kind not in "biuf":
-            raise ValueError(f"{kind} of shape {values.shape}")
-        return self.numbering.local(values, kind)
+    kind, values = value["kind"], value["values"]
+    if len(value) != 2 or not isinstance(kind, str):
+        raise ValueError("kind")
+    if kind == "dict":
+        return {k: unpacked(comm, v) for k, v in values.items()}
+    if kind == "parts":
+        return unpacked(comm, values[comm.rank])
+    record = record_of(kind)(**{k: unpacked(comm, v) for k, v in values.items()})
+    for name, hint in get_type_hints(type(record)).items():
+        if not suits(getattr(record, name), hint):
+            raise TypeError(f"{name} of {type(record).__name__}")
+    return record
 
 
 @dataclass
@@ -190,39 +182,35 @@ class Memory:
     companions: Sequence[Companion]
     setting: Setting | None
 
-    @cached_property
-    def packing(self) -> Packing:
-        """What packs arrays over the mesh; all processes come here together."""
-        return Packing(Numbering(self.system.V))
-
     def taken(self, state: State, mine: Tree) -> Tree:
-        """Return what the run knows at a state, on rank 0 in the common order of nodes.
+        """Return what the run knows at a state, on rank 0.
 
         Args:
             state: the state at the end of the last step.
             mine: identity of the run.
         """
-        record, packed = self.record, self.packing.packed
+        record, comm = self.record, self.system.comm
+        pack = partial(packed, comm)
         assert self.stepper is not None
         return {
             "identity": mine,
             "versions": versions(),
-            "positions": self.packing.numbering.positions,
+            "positions": pack(self.system.V.tabulate_dof_coordinates()),
             "t": state.t,
             "given": state.given,
-            "state": packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
-            "factored": packed(self.system.held.factored),
-            "stepper": of_stepper(self.stepper, self.packing),
+            "state": pack({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
+            "factored": pack(self.system.held.factored),
+            "stepper": of_stepper(self.stepper, comm),
             "log": self._counted(),
-            "monitor": packed(self._seen()),
-            "companions": [of_companion(companion, self.packing) for companion in self.companions],
+            "monitor": pack(self._seen()),
+            "companions": [of_companion(companion, comm) for companion in self.companions],
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
             "factorisations": self.system.factorisations,
             "columns": list(record.history.columns),
             "rows": np.array(record.history.rows()).reshape(len(record.history), -1),
             "stations": None if record.stations is None else record.stations.kept_arrays(),
             "resultants": None if record.resultants is None else record.resultants.kept_arrays(),
-            "snapshots": None if record.snapshots is None else packed(vars(record.snapshots)),
+            "snapshots": None if record.snapshots is None else pack(vars(record.snapshots)),
             "settings": None if self.setting is None else vars(self.setting),
         }
 
@@ -240,24 +228,30 @@ class Memory:
         """Make the run know what a checkpoint says; return the state to go on from.
 
         Raises:
-            SceneError: the mesh is another one, or something in the tree is not what a run has.
+            SceneError: the mesh is another one, or other processes share it, or something in the tree is not what a
+                run has.
         """
         with trusted(path):
-            here, there = self.packing.numbering.comm.bcast(self.packing.numbering.positions), tree["positions"]
-            size = float(np.max(np.ptp(here, axis=0)))
-            if there.shape != here.shape or np.max(np.abs(there - here)) > 1e-9 * size:
+            comm, here, there = self.system.comm, self.system.V.tabulate_dof_coordinates(), tree["positions"]
+            ranks = len(there["values"]) if isinstance(there, dict) else 1
+            if ranks != comm.size:
+                why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
+                raise SceneError("command line", "--resume", path, why)
+            there, near = unpacked(comm, there), 1e-9 * float(np.max(np.ptp(here, axis=0)))
+            same = there.shape == here.shape and bool(np.max(np.abs(there - here)) <= near)
+            if not comm.allreduce(same, MPI.LAND):
                 raise SceneError("command line", "--resume", path, "is of another mesh")
             self._check_rows(tree)
             return self._put_back(tree)
 
     def _put_back(self, tree: Tree) -> State:
-        stepper, unpacked, monitor, record = self.stepper, self.packing.unpacked, self.monitor, self.record
+        stepper, monitor, record, comm = self.stepper, self.monitor, self.record, self.system.comm
         assert stepper is not None
-        state, system = State(**unpacked(tree["state"]), given=tree["given"]), self.system.held
+        state, system = State(**unpacked(comm, tree["state"]), given=tree["given"]), self.system.held
         check_state(self.system, stepper, state)
         if state.t != tree["t"]:
             raise ValueError("t")
-        seen, rows = unpacked(tree["monitor"]), tree["rows"]
+        seen, rows = unpacked(comm, tree["monitor"]), tree["rows"]
         alike(self._counted(), tree["log"], "log")
         alike(self._seen() | {"stability": None}, {**seen, "stability": None}, "monitor")
         if not suits(seen["stability"], Stability | None) or len(seen["farthest"]) != len(monitor.farthest.seen):
@@ -265,13 +259,13 @@ class Memory:
         for name, kind in (("warnings", str), ("resumed", dict)):
             if not all(isinstance(entry, kind) for entry in tree["log"][name]):
                 raise TypeError(name)
-        restored(self.system, unpacked(tree["factored"]), state)
+        restored(self.system, unpacked(comm, tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
         vars(self.log).update(tree["log"], elapsed=tree["elapsed"])
         monitor.since, monitor.farthest.seen, monitor.stability = seen["since"], seen["farthest"], seen["stability"]
-        put_back_stepper(stepper, self.packing, tree["stepper"], state)
+        put_back_stepper(stepper, comm, tree["stepper"], state)
         for companion, known in zip(self.companions, tree["companions"], strict=True):
-            put_back_companion(companion, self.system, self.packing, known)
+            put_back_companion(companion, self.system, known)
         for row in rows:
             record.history.append(row)
         if record.stations is not None:
@@ -279,7 +273,10 @@ class Memory:
         if record.resultants is not None:
             record.resultants.put_back(tree["resultants"], len(rows))
         if record.snapshots is not None:
-            record.snapshots.put_back(unpacked(tree["snapshots"]), len(rows))
+            snapshots = unpacked(comm, tree["snapshots"])
+            if any(x.shape != self.system.zeros().shape for _, x in snapshots["kept"]):
+                raise ValueError("snapshots")
+            record.snapshots.put_back(snapshots, len(rows))
         return state
 
     def _check_rows(self, tree: Tree) -> None:
@@ -301,25 +298,24 @@ class Memory:
             raise ValueError("rows")
 
 
-def of_companion(companion: Companion, packing: Packing) -> Tree:
-    """Return what a companion knows: steps that wait are of the run's mesh (packing), the state of its own."""
-    own, state = Packing(Numbering(companion.system.V)), companion.state
+def of_companion(companion: Companion, comm: MPI.Comm) -> Tree:
+    """Return what a companion of a run on these processes knows."""
+    state = companion.state
     return {
-        "state": own.packed(state and state.changed(given=None, inner=())),
+        "state": packed(comm, state and state.changed(given=None, inner=())),
         "given": state and state.given,
-        "waiting": packing.packed(companion.waiting),
-        "differences": own.packed(companion.stepper.differences),
-        "factored": own.packed(companion.system.held.factored),
+        "waiting": packed(comm, companion.waiting),
+        "differences": packed(comm, companion.stepper.differences),
+        "factored": packed(comm, companion.system.held.factored),
         "known": plain(companion),
-        "stepper": of_stepper(companion.stepper, own),
+        "stepper": of_stepper(companion.stepper, comm),
     }
 
 
-def put_back_companion(companion: Companion, followed: Any, packing: Packing, tree: Tree) -> None:
+def put_back_companion(companion: Companion, followed: Any, tree: Tree) -> None:
     """Make a companion know what it knew (see `of_companion`) of the system that it follows."""
-    own = Packing(Numbering(companion.system.V))
-    state, waiting = own.unpacked(tree["state"]), packing.unpacked(tree["waiting"])
-    stepper, differences = companion.stepper, own.unpacked(tree["differences"])
+    stepper, comm = companion.stepper, followed.comm
+    state, waiting, differences = (unpacked(comm, tree[name]) for name in ("state", "waiting", "differences"))
     alike(plain(companion), tree["known"], "known")
     if not suits(state, State | None) or not suits(tuple(waiting), tuple[Followed | None, Followed | None]):
         raise TypeError("companions")
@@ -331,8 +327,8 @@ def put_back_companion(companion: Companion, followed: Any, packing: Packing, tr
     if state is not None:
         state.given = tree["given"]
         check_state(companion.system, stepper, state)
-        restored(companion.system, own.unpacked(tree["factored"]), state)
-        put_back_stepper(stepper, own, tree["stepper"], state)
+        restored(companion.system, unpacked(comm, tree["factored"]), state)
+        put_back_stepper(stepper, comm, tree["stepper"], state)
 
 
 def check_state(system: Any, stepper: Stepper, state: State) -> None:
@@ -344,6 +340,8 @@ def check_state(system: Any, stepper: Stepper, state: State) -> None:
     check_motion(system, vars(state))
     if not 0.0 <= state.t < np.inf or not isinstance(state.balanced, bool):
         raise ValueError("state")
+    if state.jump is not None and state.jump.shape != state.q.shape:
+        raise ValueError("jump")
     if (state.given is None) != (system.hub is None) or (state.given is not None and state.given.shape != (3,)):
         raise ValueError("given")
     if not suits(state.reference, ReferenceRotation | None):
@@ -414,13 +412,13 @@ def learning(stepper: Stepper) -> dict[str, Any]:
     }
 
 
-def of_stepper(stepper: Stepper, packing: Packing) -> Tree:
+def of_stepper(stepper: Stepper, comm: MPI.Comm) -> Tree:
     """Return what a stepper has learnt, and what its matrices are about."""
     learnt = {name: plain(part) for name, part in learning(stepper).items()}
-    return {**learnt, "matrices": packing.packed(stepper.matrices)}
+    return {**learnt, "matrices": packed(comm, stepper.matrices)}
 
 
-def put_back_stepper(stepper: Stepper, packing: Packing, tree: Tree, state: State) -> None:
+def put_back_stepper(stepper: Stepper, comm: MPI.Comm, tree: Tree, state: State) -> None:
     """Make a stepper know what it had learnt at a state.
 
     Raises:
@@ -428,7 +426,7 @@ def put_back_stepper(stepper: Stepper, packing: Packing, tree: Tree, state: Stat
     """
     learnt = {name: plain(part) for name, part in learning(stepper).items()}
     alike(learnt, {name: value for name, value in tree.items() if name != "matrices"}, "stepper")
-    matrices = packing.unpacked(tree["matrices"])
+    matrices = unpacked(comm, tree["matrices"])
     if matrices is not None:
         check_motion(stepper.system, matrices)
     stepper.make_matrices(matrices)
@@ -475,7 +473,7 @@ def alike(here: Any, there: Any, name: str) -> None:
     inner: list[tuple[Any, Any, Any]] = []
     if here is None:
         entries = there if isinstance(there, tuple) else (there,)
-        suitable = all(isinstance(entry, bool | int | float | None) for entry in entries)
+        suitable = all(type(entry) in (int, float, NoneType) for entry in entries)
     elif suitable and isinstance(here, dict) and here:
         suitable = set(here) == set(there)
         inner = [(key, value, there.get(key)) for key, value in here.items()]

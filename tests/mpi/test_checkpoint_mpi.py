@@ -1,4 +1,4 @@
-"""Any number of processes goes on from a checkpoint, and signals end all of them at the same step."""
+"""As many processes go on as share a mesh in a checkpoint, and signals end all of them at the same step."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ def end_of(text: str) -> float:
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
-    """Scene, number of processes ↦ a folder with the whole run of one process and six tenths of one by so many."""
+    """Scene, number of processes ↦ a folder with the whole run by so many, and six tenths of one."""
 
     @cache
     def folder(text: str, first: int) -> Path:
         out = tmp_path_factory.mktemp("begun")
         (out / "scene.toml").write_text(text)
-        assert rotfem(out, 1, *COMMAND, "-o", "whole").returncode == 0
+        assert rotfem(out, first, *COMMAND, "-o", "whole").returncode == 0
         half = rotfem(out, first, *COMMAND, "-o", "cut", "--checkpoint", "3", "--set", f"time.end={0.6 * end_of(text)}")
         assert half.returncode == 0, half.stderr
         return out
@@ -70,22 +70,20 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path
     return folder
 
 
-@pytest.mark.parametrize(
-    ("text", "first", "second"), [(BEAM, 1, 2), (PLATE, 2, 1), (PLATE, 2, 3)], ids=["beam", "plate", "plate, more"]
-)
-def test_another_number_of_processes_goes_on(
-    tmp_path: Path, begun: Callable[[str, int], Path], text: str, first: int, second: int
+@pytest.mark.parametrize(("text", "ranks"), [(BEAM, 2), (PLATE, 2), (PLATE, 3)], ids=["beam", "plate", "plate, three"])
+def test_processes_that_share_a_mesh_go_on(
+    tmp_path: Path, begun: Callable[[str, int], Path], text: str, ranks: int
 ) -> None:
     """To 1e-9 of the largest value of a column: sums in another order, and Newton's last increments, are left.
 
     The stiffness of the axis makes a hundred times as much of these in the forces at the root.
     """
     end = end_of(text)
-    shutil.copytree(begun(text, first), tmp_path, dirs_exist_ok=True)
-    done = rotfem(tmp_path, second, *COMMAND, "-o", "cut", "--resume")
+    shutil.copytree(begun(text, ranks), tmp_path, dirs_exist_ok=True)
+    done = rotfem(tmp_path, ranks, *COMMAND, "-o", "cut", "--resume")
     assert done.returncode == 0, done.stderr
     (note,) = json.loads((tmp_path / "cut" / "summary.json").read_text())["resumed"]
-    assert note["ranks"] == second
+    assert note["ranks"] == ranks
     assert 0.5 * end < note["time"] < 0.6 * end
     for name in ("history.csv", "shape.csv"):
         whole, cut = (read_csv(tmp_path / folder / name) for folder in ("whole", "cut"))
@@ -95,6 +93,14 @@ def test_another_number_of_processes_goes_on(
         for column, values in whole.items():
             scale = float(np.max(np.abs(values))) * (100.0 if column.startswith("root_") else 1.0)
             np.testing.assert_allclose(cut[column][again], values[order], rtol=0, atol=1e-9 * scale, err_msg=column)
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_another_number_of_processes_is_refused(tmp_path: Path, begun: Callable[[str, int], Path], ranks: int) -> None:
+    shutil.copytree(begun(PLATE, 2), tmp_path, dirs_exist_ok=True)
+    done = rotfem(tmp_path, ranks, *COMMAND, "-o", "cut", "--resume")
+    assert done.returncode == 2
+    assert f"is of a mesh that 2 processes share, and here are {ranks}: go on with as many" in done.stderr
 
 
 RANK = "$OMPI_COMM_WORLD_RANK"

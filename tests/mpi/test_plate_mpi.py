@@ -43,12 +43,11 @@ def test_modes_of_a_large_plate_on_two_processes(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
 
 
-def test_history_on_four_processes(tmp_path: Path) -> None:
-    """Those on two and three are compared in `test_checkpoint_mpi`."""
+def test_history_on_two_and_four_processes(tmp_path: Path) -> None:
     time = "[time]\nend = 0.02\nstep = 1e-3\n"
     (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**RECTANGLE) + time)
     histories = []
-    for ranks in (1, 4):
+    for ranks in (1, 2, 4):
         done = rotfem(tmp_path, ranks, "run", "plate.toml", "--no-plots", "-o", f"r{ranks}")
         assert done.returncode == 0, done.stderr
         assert list((tmp_path / f"r{ranks}").glob("fields.*"))
