@@ -136,7 +136,7 @@ def diagram(
         hint: see `campbell`.
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
-    hints = hints_of(analysis, scene, "campbell", hint, fastest)
+    hints = hints_of(analysis, scene, hint, fastest)
     full, analysis = analysis, in_basis(analysis, values, count + SPARE)
     sweep = Sweep(analysis, count, scene.limits.speeds)
     if analysis.everyone.size > analysis.comm.size:  # each process has a copy

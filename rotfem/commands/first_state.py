@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.stability import Stability, act_at_start, are_constant, constant_stability, stability_of
+from rotfem.analysis.stability import Stability, constant_stability, stability_of
 from rotfem.commands.problem import first_motion
 from rotfem.equations.compiled import compile_system, with_all_unknowns
 from rotfem.errors import ComputationError
@@ -39,20 +39,6 @@ class Start:
     v: Array | None = None
     stability: Stability | None = None
     warnings: list[str] = field(default_factory=list)
-
-
-def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
-    """Return hints about what a history starts from: where that rings for ever, or never moves."""
-    initial = scene.initial
-    if scene.time is None or initial.tip_displacement is not None or not act_at_start(problem):
-        return []
-    if initial.state == "undeformed":
-        what = "what acts at t = 0 acts all at once, and what that sets ringing is followed to the end"
-        return [f'initial.state = "undeformed": {what}; "steady" starts in balance']
-    if initial.moves or not are_constant(problem):
-        return []
-    what = "speed and loads are constant, and the history starts in balance: nothing will move"
-    return [f'{what}; initial.state = "undeformed" lets them act all at once at t = 0']
 
 
 def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True) -> Start:

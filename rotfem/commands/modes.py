@@ -113,7 +113,7 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     started = perf_counter()
     analysis = analysis_of(scene, problem, comm)
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
-    hints = hints_of(analysis, scene, "modes", hint, speed)
+    hints = hints_of(analysis, scene, hint, speed)
     found = mode_tables(analysis, speed, scene.modes.count, keep=False, formats=scene.output.fields)
     check_rows(found.rows)
     spinning = found.spinning
@@ -170,10 +170,10 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnal
     return analysis
 
 
-def hints_of(analysis: ModalAnalysis, scene: Scene, command: str, hint: Hint | None, speed: float) -> list[str]:
+def hints_of(analysis: ModalAnalysis, scene: Scene, hint: Hint | None, speed: float) -> list[str]:
     """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
     theory, critical = analysis.problem.theory, None
     if hint is not None and theory.linear and not theory.prestress:
         with suppress(ComputationError):  # a hint is worth no failure
             critical = critical_speed(analysis.system)
-    return advise(scene, command, hint, speed, critical)
+    return advise(scene, hint, speed, critical)

@@ -25,10 +25,10 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.advice import advise
+from rotfem.commands.advice import advise, hints_of_start
 from rotfem.commands.checkpoint import Memory
 from rotfem.commands.error_report import RunErrors, check_rotations, output_of
-from rotfem.commands.first_state import Start, first_state, hints_of_start
+from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.monitor import Log, Monitor
@@ -396,7 +396,7 @@ def simulate(
         simulation = Simulation(variant, problem, store, setting, clock)
         if scene.accuracy is None:
             also, critical = hints_of_start(variant, simulation.problem), simulation.monitor.critical
-            simulation.log.advice = advise(variant, "run", hint, critical=critical, also=also)
+            simulation.log.advice = advise(variant, hint, critical=critical, also=also)
         elif setting is not None and setting.reduced:
             check_rotations(variant, simulation.system)
         return simulation.run(progress)

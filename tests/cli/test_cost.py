@@ -160,23 +160,21 @@ def test_interrupt_keeps_what_is_finished(folder: Path) -> None:
 
 
 def test_hint_at_the_start_of_a_run(rotfem: Rotfem, folder: Path) -> None:
-    coarse = ("run", "beam.toml", "--set", "time.step=0.2", "--no-plots")
-    done = rotfem(*coarse)
+    still = ("run", "beam.toml", "--set", "motion.type=constant", "--set", "time.end=0.1", "--no-plots", "--no-error")
+    text = (folder / "beam.toml").read_text()
+    (folder / "beam.toml").write_text("\n".join(x for x in text.split("\n") if not x.startswith("duration")))
+    done = rotfem(*still)
     assert done.status == 0
-    assert done.err.startswith("hint: time.step = 0.2 s")
-    hint, _ = done.err.split("\n", 1)
-    assert "hint" not in done.err.removeprefix(hint)
+    (hint,) = done.err.splitlines()
+    assert hint.startswith("hint: speed and loads are constant")
     summary = folder / "results" / "beam" / "summary.json"
     assert json.loads(summary.read_text())["advice"] == [hint.removeprefix("hint: ")]
-    assert "hint" not in rotfem(*coarse, "-q").err
-    assert "hint" not in rotfem(*coarse, "--no-advice").err
+    assert "hint" not in rotfem(*still, "-q").err
+    assert "hint" not in rotfem(*still, "--no-advice").err
     assert json.loads(summary.read_text())["advice"] == []
-    assert rotfem("run", "beam.toml", "--no-plots").err == ""
 
 
-def test_hints_of_modes_and_campbell(rotfem: Rotfem) -> None:
-    many = ("--set", "modes.count=6", "--set", "mesh.elements=3", "--no-plots")
-    assert rotfem("modes", "beam.toml", *many).err.startswith("hint: mesh.elements = 3")
+def test_hints_of_campbell(rotfem: Rotfem) -> None:
     fast = ("campbell", "beam.toml", "--speeds", "0,5", "--set", "model.theory=linear", "--set", "modes.count=1")
     assert (
         'hint: model.theory = "linear" has no centrifugal stiffening, and loses its stiffness at 3.8 rad/s'
