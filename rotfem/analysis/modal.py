@@ -391,9 +391,10 @@ class Described:
             mixed = others and self.shares[first][j] < 0.8
             out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
         pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
-        if np.any(pairs.values.imag == 0.0):
+        if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
-            out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))))
+            sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
+            out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
         return with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
 
 

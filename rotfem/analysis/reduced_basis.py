@@ -82,7 +82,8 @@ class SmallPencil(Pencil):
         """Return the pairs of smallest |λ| (see `Pencil.solve`), their errors those of the small problem."""
         found = self._skew(count) if self.conservative else None
         values, x, y = found or quadratic(self.M, self.C, self.K, target)
-        if found is None and heavily_damped(values[: 2 * count + 2], 0.0) and self.asymmetries["C"] > 1e-10:
+        first = np.arange(min(2 * count + 2, len(values)))
+        if self.damped and heavily_damped(values[first][self.stiff(x[:, first])]):
             whole = (PETSc.Mat().createAIJ(A.shape, csr=_csr(A), comm=MPI.COMM_SELF) for A in (self.M, self.C, self.K))
             return Pencil(*whole).solve(count, target)
         telling = (values.real >= 0.0) | (not self.conservative)
@@ -92,10 +93,19 @@ class SmallPencil(Pencil):
         MX, CX, KX = np.split(product(np.vstack([self.M, self.C, self.K]), x), 3)
         n = np.sum(y.conj() * (2 * values * MX + CX), axis=0)
         residual = values**2 * MX + values * CX + KX
-        sizes = np.sqrt(np.abs(np.diag(self.K)))
-        rounded = ROUNDED * (sizes @ np.abs(y)) * (sizes @ np.abs(x))
-        off = (np.sum(np.abs(y) * np.abs(residual), axis=0) + rounded) / np.maximum(np.abs(n * values), 1e-300)
+        lost = np.sum(np.abs(y) * np.abs(residual), axis=0) + self._rounded(y, x)
+        off = lost / np.maximum(np.abs(n * values), 1e-300)
         return Eigenpairs(values, x, y, off, relative(off))
+
+    def _rounded(self, y: Array, x: Array) -> Array:
+        """Return a bound of |y^H δK x| by round-off for the columns of y and x."""
+        sizes = np.sqrt(np.abs(np.diag(self.K)))
+        return np.asarray(ROUNDED * (sizes @ np.abs(y)) * (sizes @ np.abs(x)))
+
+    def stiff(self, X: Array) -> Array:
+        """Return of which columns of X round-off leaves the sign of x^H K x (see `Pencil.stiff`)."""
+        energy = np.sum(X.conj() * product(self.K, X), axis=0)
+        return np.asarray(np.abs(energy) > self._rounded(X, X))
 
     def _skew(self, count: int) -> tuple[Array, Array, Array] | None:
         """Return the first (λ, x, y) with positive imaginary parts; None where K is not positive definite."""

@@ -92,7 +92,7 @@ class RoundOff:
         MX, CX, KX = (p.apply(A, right) for A in (p.M, p.C, p.K))
         n = summed(p.comm, np.sum(left.conj() * (2 * values * MX + CX), axis=0))
         residual = values**2 * MX + values * CX + KX
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # λ may be zero
             step = -summed(p.comm, np.sum(left.conj() * residual, axis=0)) / n
             near = np.abs(step) < 1e-4 * np.abs(values)  # farther: no eigenvectors
             values = np.where(near, values + step, values)
@@ -326,7 +326,7 @@ class Pencil(Sendable):
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
         small = ZERO * self._smallest if target > 0.0 else 0.0
-        if not self.conservative and heavily_damped(values, small) and self.damped:
+        if self.damped and heavily_damped(values[self.stiff(right) & (np.abs(values) > small)]):
             return self._damped(count, target)
         if self.conservative:
             left = mirrored(values, right)
@@ -344,6 +344,11 @@ class Pencil(Sendable):
     def damped(self) -> bool:
         """Whether C has a symmetric part."""
         return self.asymmetries["C"] > 1e-10
+
+    def stiff(self, X: Array) -> Array:
+        """Return of which columns of X round-off leaves the sign of x^H K x, shape (m,)."""
+        energy = summed(self.comm, np.sum(X.conj() * self.apply(self.K, X), axis=0))
+        return np.asarray(np.abs(energy) > RoundOff(self, self.sizes, self.factors).stiffness(X, X))
 
     def _damped(self, count: int, target: float) -> Eigenpairs:
         """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.ritz`)."""

@@ -24,7 +24,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.linear import ROUNDED, DirectSolver
 from rotfem.numerics.projection import new_directions, sparse_part, summed, times
 
 Array = npt.NDArray[Any]
@@ -44,10 +44,9 @@ DONE, CLOSE = 1e-13, 1e-7
 EQUAL = 1e-9
 
 
-def heavily_damped(values: Array, small: float) -> bool:
-    """Return whether eigenvalues (1/s), those above `small` in size, have heavy damping among them, −Re λ > 0.3 |λ|."""
-    sizes = np.abs(values)
-    return bool(np.any((sizes > small) & (values.real < -0.3 * sizes)))
+def heavily_damped(values: Array) -> bool:
+    """Return whether eigenvalues (1/s) that are not zero have heavy damping among them, −Re λ > 0.3 |λ|."""
+    return bool(np.any(values.real < -0.3 * np.abs(values)))
 
 
 def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array, Array]:
@@ -157,16 +156,19 @@ def _norm(comm: MPI.Comm, A: Any, signs: Array, d: Array) -> float:
 def place(values: Array, X: Array, MX: Array, KX: Array) -> Array:
     """Return what to sort eigenvalues by: ω of their shape, of the fast one of two real ones that of the slow one.
 
-    ω = √|x^H K x / x^H M x|, the frequency of the shape without damping (Rayleigh quotient).
+    ω = √|x^H K x / x^H M x|, the frequency of the shape without damping (Rayleigh quotient). The slow one may be zero,
+    as that of a hinge with a damper and no spring, and so have either sign.
     """
     mass, stiffness = (np.abs(np.sum(X.conj() * Y, axis=0)) for Y in (MX, KX))
     omega = np.asarray(np.sqrt(stiffness / mass))
-    real = (values.imag == 0.0) & (values.real < 0.0)
+    real = values.imag == 0.0
     slow, fast = (np.flatnonzero(real & part) for part in (np.abs(values) < omega, ~(np.abs(values) < omega)))
     if len(slow) and len(fast):
         sizes = np.sqrt(np.abs(np.sum(X.conj() * MX, axis=0)))
         alike = np.abs(X[:, fast].conj().T @ MX[:, slow]) / np.outer(sizes[fast], sizes[slow])
-        omega[fast] = omega[slow[np.argmax(alike, axis=1)]]
+        alike[np.abs(values[fast])[:, None] <= np.abs(values[slow])] = 0.0
+        there = np.any(alike, axis=1)
+        omega[fast[there]] = omega[slow[np.argmax(alike[there], axis=1)]]
     return omega
 
 
@@ -250,6 +252,9 @@ class RitzPairs:
         turn_equal(values, (x, y), (m, c, k))
         # The square of a larger eigenvalue, times anything, may be no number any more.
         upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
+        zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * self.norms[2]
+        pairs = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ
+        upper &= ~((values.real < 0.0) & np.any(pairs & zero[:, None] & zero, axis=0))
         if not np.any(upper):
             raise ComputationError("damping is so far out of proportion that no mode is left")
         values, x, y = values[upper], x[:, upper], y[:, upper]

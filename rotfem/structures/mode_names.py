@@ -237,7 +237,9 @@ def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) 
 # --- names of several modes ---------------------------------------------------------------------------------------
 
 
-def with_overdamped(names: list[str], values: npt.NDArray[Any], energies: tuple[npt.NDArray[Any], ...]) -> list[str]:
+def with_overdamped(
+    names: list[str], values: npt.NDArray[Any], energies: tuple[npt.NDArray[Any], ...], sure: npt.NDArray[Any]
+) -> list[str]:
     """Return the names of modes, those of overdamped ones as "lag 4, slow" and "lag 4, fast".
 
     The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
@@ -247,9 +249,10 @@ def with_overdamped(names: list[str], values: npt.NDArray[Any], energies: tuple[
         names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
         values: λ, 1/s.
         energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
+        sure: of which modes round-off leaves the sign of λ and of x^H K x. It does not at a hinge without a spring.
     """
     mass, stiffness = (np.real(e) for e in energies)
-    over = (values.imag == 0.0) & (values.real < 0.0) & (stiffness > 0.0) & (mass > 0.0)
+    over = (values.imag == 0.0) & (mass > 0.0) & (~sure | ((values.real < 0.0) & (stiffness > 0.0)))
     if not np.any(over):
         return names
     vibrating, out = Counter[str](), list(names)
@@ -259,7 +262,7 @@ def with_overdamped(names: list[str], values: npt.NDArray[Any], energies: tuple[
         if not over[j]:
             vibrating[kind] += 1
             continue
-        speed = "slow" if abs(values[j]) ** 2 * mass[j] < stiffness[j] else "fast"
+        speed = "slow" if abs(values[j]) ** 2 * mass[j] < abs(stiffness[j]) else "fast"
         counted[speed][kind] += 1
         out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
     return out

@@ -170,3 +170,27 @@ def test_a_damper_at_a_hinge_on_every_mesh() -> None:
     found = [modes({**scene, "mesh": {"elements": n}}) for n in (12, 24)]
     np.testing.assert_allclose(found[0].frequencies, found[1].frequencies, rtol=1e-4)
     assert all(np.all(np.array([row["residual"] for row in r.summary["modes"]]) < 1e-8) for r in found)
+
+
+@pytest.mark.parametrize("damper", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("damping", [{}, {"kelvin_voigt": 1e-3}, {"modal": [0.01, 0.02]}], ids=str)
+def test_a_damper_at_a_hinge_without_a_spring(damper: float, damping: dict[str, Any]) -> None:
+    """Its zero eigenvalue is the slow one of an overdamped mode, whatever the sign that round-off gives to it.
+
+    Stiffness, mass and damper in other proportions of the same eigenvalues are rounded otherwise, which moves the zero
+    to either side and, with its error bound, nothing else: the lists are the same.
+    """
+    found = []
+    for size in (1.0, 1.1, 1.3, 1.7, 3.0):
+        section = {"EA": 1e5, "GA": 3e4, "EI": 120.0, "mass_per_length": 0.5, "rotary_inertia": 2e-4}
+        root = {"lag_stiffness": 0.0, "lag_damping": size * damper}
+        beam = {"section": {k: size * v for k, v in section.items()}, "root": root, "damping": damping}
+        structure = {"type": "planar_beam", "length": 2.0, "hub_radius": 0.3, **beam}
+        scene = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
+        result = modes({**scene, "model": {"theory": "linear"}, "mesh": {"elements": 3}, "output": {"error": False}})
+        found.append([(row["label"], row["growth"], row["frequency"]) for row in result.rows])
+        assert result.rows[0]["label"] == "lag 1, slow"
+        assert result.rows[0]["error_bound"] >= 1.0
+    for other in found[1:]:
+        assert [label for label, *_ in other] == [label for label, *_ in found[0]]
+        np.testing.assert_allclose([r[1:] for r in other], [r[1:] for r in found[0]], rtol=1e-3, atol=1e-6)
