@@ -1,8 +1,16 @@
-"""Tests marked nightly run only where they are asked for: `pytest -m nightly`, or by their full name."""
+"""What holds for all tests.
+
+Those marked nightly run only where they are asked for: `pytest -m nightly`, or by their full name. Forms are compiled
+in haste, as most are used for few steps on few cells: that takes half the time.
+"""
 
 from __future__ import annotations
 
+import os
+
 import pytest
+
+os.environ.setdefault("ROTFEM_HASTE", "1")  # before rotfem is imported, and for the processes that tests start
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

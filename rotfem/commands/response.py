@@ -42,7 +42,7 @@ from rotfem.units import quantity
 Array = npt.NDArray[Any]
 
 #: Change of the log of an amplitude that bends its curve visibly; least distance of frequencies added for it, in parts
-#: of the range; part of the largest amplitude below which one is too small to matter.
+#: of the range; part of the largest amplitude of its unit below which one is too small to matter.
 BEND, NARROW, DEEP = 0.2, 2e-4, 1e-6
 
 
@@ -89,7 +89,7 @@ def response(
         direct = answers_at(asked)
         if not len(per_rev) or low is not None or high is not None:
             given = asked[~peaks]
-            asked, direct = resolved(answers_at, asked, direct, number)
+            asked, direct = resolved(answers_at, asked, direct, answers.names, number)
             peaks = ~np.isin(asked, given)
         modal = answers.modal(asked, scene.modes.count)
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
@@ -146,7 +146,9 @@ def frequencies_of(
     return asked, ~np.isin(asked, grid), undamped
 
 
-def resolved(answers_at: Callable[[Array], Array], omegas: Array, values: Array, most: int) -> tuple[Array, Array]:
+def resolved(
+    answers_at: Callable[[Array], Array], omegas: Array, values: Array, outputs: Sequence[str], most: int
+) -> tuple[Array, Array]:
     """Return frequencies (rad/s) and answers, so close that amplitudes on a logarithmic scale run smoothly.
 
     Where the logarithm of an amplitude is off the line through its neighbours by more than BEND, the intervals on both
@@ -156,12 +158,16 @@ def resolved(answers_at: Callable[[Array], Array], omegas: Array, values: Array,
         answers_at: frequencies ↦ amplitudes of the outputs, (frequencies, outputs).
         omegas: frequencies, increasing, at least three.
         values: the answers there, (frequencies, outputs).
+        outputs: their names.
         most: frequencies that may be added.
     """
     least, left = NARROW * float(omegas[-1] - omegas[0]), most
+    units = np.array([described(name)[1] for name in outputs])
+    of_one_unit = units[:, None] == units
     while left > 0:
         sizes = np.abs(values)
-        heights = np.log(np.maximum(sizes, DEEP * np.max(sizes, axis=0, keepdims=True) + 1e-300))
+        largest = np.max(of_one_unit * np.max(sizes, axis=0), axis=1)
+        heights = np.log(np.maximum(sizes, DEEP * largest + 1e-300))
         part = ((omegas[1:-1] - omegas[:-2]) / (omegas[2:] - omegas[:-2]))[:, None]
         bend = np.max(np.abs(heights[1:-1] - (1 - part) * heights[:-2] - part * heights[2:]), axis=1)
         of_interval = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))

@@ -5,6 +5,7 @@ A kill in the middle, two programs at once, or a damaged cache do no harm.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -123,6 +124,10 @@ class Assembler:
 #: on a few cells. -O2 makes code for lines quicker by a tenth. That for surfaces is long: -O2 takes twice as long over
 #: it as -O1, and makes it no quicker up to degree 3, at degree 4 by a seventh; -O0 makes it three times slower.
 OFTEN, SELDOM = {1: "-O2", 2: "-O1"}, {1: "-O0", 2: "-O1"}
+
+#: All are compiled in haste for many short computations, as those of tests: ROTFEM_HASTE in the environment, not empty.
+if os.environ.get("ROTFEM_HASTE"):
+    OFTEN = SELDOM = dict.fromkeys(OFTEN, "-O0")
 
 #: Further options of the C compiler.
 FLAGS = ("-g0", "-w")

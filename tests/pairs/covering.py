@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from itertools import combinations, product
 
 #: Factor ↦ the level chosen.
@@ -37,11 +37,13 @@ def covering(
     conflicts: Sequence[Levels],
     seed: int,
     also: Sequence[Levels] = (),
+    made_of: Callable[[Row], tuple[Hashable, float]] = lambda row: (None, 0.0),
 ) -> Iterator[tuple[Row, int]]:
     """Yield rows until every set of so many choices that can occur has, with how many new ones each row has.
 
-    Greedily: of several random rows with one of the sets that are left, the one with most of them. Source of arrays
-    with larger sets of some factors: Cohen, Gibbons, Mugridge & Colbourn, ICSE 2003, p. 38 (variable strength).
+    Greedily: of several random rows with one of the sets that are left, the one with most of them for its price. Source
+    of arrays with larger sets of some factors: Cohen, Gibbons, Mugridge & Colbourn, ICSE 2003, p. 38 (variable
+    strength).
 
     Args:
         strength: choices in a set: 2 of pairs, 3 of triples.
@@ -50,7 +52,14 @@ def covering(
         conflicts: what no row may have.
         seed: of the random numbers.
         also: factors and levels of which every row of choices is wanted as well.
+        made_of: row ↦ what has to be made for it, once, and its price, that of any row being 1.
     """
+    made = set[Hashable]()
+
+    def worth(found: tuple[Row, set[Chosen]]) -> float:
+        needed, price = made_of(found[0])
+        return len(found[1]) / (1.0 if needed in made else 1.0 + price)
+
     rng = random.Random(seed)
     sets = sets_wanted(strength, shuffled(rng), also)
     rng.shuffle(sets)
@@ -60,11 +69,12 @@ def covering(
         if wanted not in left:
             continue
         barred = [*conflicts, idle(wanted, active)]
-        rows = (completed(dict(wanted), shuffled(rng), barred) for _ in range(12))
+        rows = (completed(dict(wanted), shuffled(rng), barred) for _ in range(40))
         found = [(row, left.intersection(sets_of(row, strength, active, also))) for row in rows if row is not None]
-        row, new = max(found, key=lambda pair: len(pair[1]), default=(None, {wanted}))
+        row, new = max(found, key=worth, default=(None, {wanted}))
         left -= new
         if row is not None:
+            made.add(made_of(row)[0])
             yield row, len(new)
 
 

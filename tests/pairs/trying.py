@@ -17,7 +17,7 @@ from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Levels, Row, covering, missing
 from tests.pairs.refusals import REFUSALS, WHOLE
-from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, TOLERANCE, as_toml, shuffled, tables_of
+from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, TOLERANCE, as_toml, forms_of, shuffled, tables_of
 
 #: What no row has.
 CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *WHOLE]
@@ -33,9 +33,9 @@ def name_of(row: Row) -> str:
     return "-".join(level.replace(" ", "_") for level in row.values())
 
 
-def rows_of(strength: int, seed: int) -> Iterator[Row]:
-    """Return rows with every set of so many choices that can occur together."""
-    return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed, ALSO))
+def rows_of(strength: int, seed: int, also: Sequence[Levels] = ALSO) -> Iterator[Row]:
+    """Return rows with every set of so many choices that can occur together, and those of some factors."""
+    return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed, also, forms_of))
 
 
 #: Mark of tests on two processes.

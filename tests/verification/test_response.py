@@ -211,7 +211,7 @@ def test_curves_are_resolved_where_they_bend() -> None:
 
     first = np.linspace(0.0, 3.0, 12)
     values = answers_at(first)
-    omegas, found = resolved(answers_at, first, values, 500)
+    omegas, found = resolved(answers_at, first, values, ["tip_u2"], 500)
     assert np.all(np.isin(first, omegas))
     np.testing.assert_array_equal(found, [answer(omega) for omega in omegas])
     heights = np.log(np.abs(found[:, 0]))
@@ -222,5 +222,16 @@ def test_curves_are_resolved_where_they_bend() -> None:
     ]
     assert len(bends) > 30
     assert max(bends) < BEND
-    few, _ = resolved(answers_at, first, values, 20)
+    few, _ = resolved(answers_at, first, values, ["tip_u2"], 20)
     assert len(few) == len(first) + 20
+
+
+def test_round_off_of_one_output_inserts_no_frequencies() -> None:
+    """An amplitude that is zero but for round-off has no curve: another one of its unit says what is small."""
+
+    def answers_at(omegas: np.ndarray) -> np.ndarray:
+        return np.array([[1.0 + omega, 1e-17 * (1.0 + np.sin(1e4 * omega))] for omega in omegas])
+
+    first = np.linspace(0.0, 1.0, 9)
+    omegas, _ = resolved(answers_at, first, answers_at(first), ["tip_u3", "tip_u2"], 100)
+    np.testing.assert_array_equal(omegas, first)
