@@ -270,21 +270,17 @@ class Pencil(Sendable):
     def asymmetries(self) -> dict[str, float]:
         """Estimates of relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
 
-        They are those by four random vectors of signs r: the mean of ‖A r‖² is the norm's square.
+        They are those by four random vectors r of normal distribution: the mean of ‖A r‖² is the square of the norm of
+        A, that of (sᵀA r)² too.
         """
-        out, matrices = {}, (self.M, self.C, self.K)
-        with balanced(*matrices, scale=self.unknowns):  # else the unit of length would say which entries count
-            for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
-                r, y = A.createVecs()
-                z, squares, random = y.duplicate(), np.zeros(2), np.random.default_rng(A.comm.rank)
-                for _ in range(4):
-                    r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
-                    A.mult(r, y)
-                    A.multTranspose(r, z)
-                    size = y.norm()
-                    z.axpy(sign, y)
-                    squares += z.norm() ** 2, size**2
-                out[name] = float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0 else 0.0
+        d = (unknown_scale(self.M, self.K, 1.0) if self.unknowns is None else self.unknowns).array[:, None]
+        R = d * np.random.default_rng(self.comm.rank).standard_normal((len(d), 4))  # scaled, as units would say else
+        out = {}
+        for name, A, sign in zip("MCK", (self.M, self.C, self.K), (-1.0, 1.0, -1.0), strict=True):
+            AR = times(A, R)
+            mixed, size = summed(self.comm, R.T @ AR), summed(self.comm, float(np.sum((d * AR) ** 2)) / 4)
+            apart = np.sum(np.triu(mixed + sign * mixed.T, 1) ** 2) / 6
+            out[name] = float(np.sqrt(apart / size)) if size > 0.0 else 0.0
         return out
 
     @cached_property

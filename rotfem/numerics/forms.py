@@ -53,7 +53,7 @@ class Assembler:
             self._rows, self._columns = (np.array(x, PETSc.IntType) for x in (self._own.indptr, self._own.indices))
             size = (len(self._rows) - 1,) * 2
             self._sizes, self._block, self._comm = size, form.function_spaces[0].dofmap.index_map_bs, form.mesh.comm
-            self._kept: npt.NDArray[np.bool_] | None = None
+            self._kept: npt.NDArray[np.intp] | None = None
             self.pattern = self._with(np.zeros(len(self._columns)))
             return
         self.pattern = fem_petsc.create_matrix(form)
@@ -62,7 +62,7 @@ class Assembler:
 
     def release(self) -> None:
         """Give back the memory of a matrix; PETSc assembles what is still to come."""
-        self._own = None
+        self._own = self._kept = None
 
     def zero(self) -> Any:
         """Return a new matrix of zeros, which takes up memory when it is filled."""
@@ -101,7 +101,7 @@ class Assembler:
         if coupled.all():
             return
         component = np.arange(len(neighbours)) % block
-        self._kept = coupled[np.repeat(component, neighbours)].ravel()
+        self._kept = np.flatnonzero(coupled[np.repeat(component, neighbours)])
         self._rows = np.append(0, np.cumsum(neighbours * coupled.sum(axis=1)[component])).astype(PETSc.IntType)
         self._columns = self._columns[self._kept]
         self.pattern = self._with(np.zeros(len(self._columns)))

@@ -123,7 +123,7 @@ class DirectSolver:
         use_direct_solver(self._ksp, size, symmetric, small=0 if counting else MIDDLE if wide else SMALL)
         self._ksp.setErrorIfNotConverged(False)
         self._counting = self._ksp.getPC().getType() == PETSc.PC.Type.CHOLESKY
-        self._definite = A.comm.size == 1  # as long as no factor has shown another thing
+        self._definite: bool = A.comm.size == 1  # as long as no factor has shown another thing
         self._stale = True
 
     def refresh(self, A: Any = None) -> None:

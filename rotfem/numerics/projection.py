@@ -62,14 +62,19 @@ def dense(comm: Any, X: Array) -> Any:
     return PETSc.Mat().createDense(((len(X), None), (None, X.shape[1])), array=columns, comm=comm)
 
 
+def combined(V: Array, factors: Array) -> Array:
+    """Return V times a small matrix, in Fortran order, as `dense` does not copy it."""
+    return np.asarray((factors.T @ V.T).T)
+
+
 def new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
     """Return an orthonormal basis of what columns W add to the orthonormal V: parts of 1e-8 of a column and more."""
     W = W / np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", W, W)), 1e-300))
     for limit in (1e-16, 0.5):  # twice, as once leaves round-off of what was taken away
-        W = W - V @ summed(comm, V.T @ W)
+        W = W - combined(V, summed(comm, V.T @ W))
         sizes, turns = np.linalg.eigh(summed(comm, W.T @ W))
-        W = W @ (turns[:, sizes > limit] / np.sqrt(sizes[sizes > limit]))
-    return np.asarray(W)
+        W = combined(W, turns[:, sizes > limit] / np.sqrt(sizes[sizes > limit]))
+    return W
 
 
 def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:
