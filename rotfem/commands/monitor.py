@@ -1,7 +1,4 @@
-"""What a run counts, and what it watches in its states: the range of its theory, finite numbers, and energy.
-
-Energy and momentum that a history has from nowhere show what steps that are too long do before anything else is seen.
-"""
+"""What a run counts, and what it watches in its states: the range of its theory, and finite numbers."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
@@ -20,11 +16,6 @@ from rotfem.analysis.stability import Stability
 from rotfem.analysis.theory_error import Farthest
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory, richest, theories
-
-Array = npt.NDArray[np.float64]
-
-#: Growth of the Jacobi integral, relative to the energy exchanged, that is reported.
-GROWN = 0.02
 
 
 @dataclass
@@ -102,85 +93,6 @@ class Monitor:
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
         self.farthest(state.q, state.t)
-
-
-def growth(history: dict[str, Array], between: bool = False) -> float:
-    """Return by how much the Jacobi integral grew, relative to the energy exchanged; 0 where that is nothing.
-
-    Schemes let it fluctuate with the motion by h²; so the largest of the last tenth of the rows is compared with the
-    largest of the first tenth. What is exchanged is the range of the strain energy or of the kinetic one.
-
-    Args:
-        history: columns by name; a row that is not finite and all after it are left out.
-        between: whether rows lie between steps, see `_growth`.
-    """
-    energies = np.array([history[name] for name in ("jacobi", "kinetic", "strain")])
-    return _growth(energies[0], energies[1:], between)
-
-
-def growth_on_hub(history: dict[str, Array], between: bool = False) -> float:
-    """Return by how much the energy of hub and structure grew beyond the work of torque and brake (see `growth`)."""
-    kinetic = history["kinetic"] + history["hub_kinetic"]
-    return _growth(kinetic + history["strain"] - history["work"], np.array([kinetic, history["strain"]]), between)
-
-
-def _growth(constant: Array, moving: Array, between: bool) -> float:
-    """Return the growth of what should stay, shape (n,), relative to the range of energies, shape (m, n).
-
-    Where rows lie between steps a polynomial in time stretches what turns far in a step, which the steps themselves do
-    not; the rows next to their ends have least of it, so the least of the last rows counts there, and not the largest.
-    """
-    fine: npt.NDArray[np.bool_] = np.all(np.isfinite(np.vstack([constant, moving])), axis=0)
-    n = len(fine) if fine.all() else int(np.argmin(fine))
-    if n < 20:  # too few to distinguish a growth from a fluctuation
-        return 0.0
-    constant, moving, part = constant[:n], moving[:, :n], n // 10
-    exchanged = float(np.max(np.ptp(moving, axis=1)))
-    last = np.min(constant[-part:]) if between else np.max(constant[-part:])
-    grown = float(last - np.max(constant[:part]))
-    round_off = 1e-9 * float(np.max(np.abs(moving)))
-    return grown / exchanged if exchanged > round_off and grown > 0.0 else 0.0
-
-
-def energy_warning(system: Any, history: dict[str, Array], between: bool = False) -> str:
-    """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came.
-
-    `between` is whether rows of the history lie between steps, see `_growth`.
-    """
-    if system.hub is None:
-        share = growth(history, between) if system.model.closed else 0.0
-        said = (
-            f"the energy has grown by {100 * share:.2g} % of the energy exchanged, though nothing supplies any: the "
-            "time steps are too long for this motion, or unstable; give a smaller time.step, "
-            'time.scheme = "energy_conserving", or numerical damping'
-        )
-        return said if share >= GROWN else ""
-    cause = "the time steps do not resolve the motion of the hub, as where it has little inertia of its own"
-    momentum, impulse = history["angular_momentum"], history["impulse"]
-    largest = max(np.max(np.abs(momentum), initial=0.0), np.max(np.abs(impulse), initial=0.0))
-    off = float(np.ptp(momentum - impulse)) if len(momentum) else 0.0
-    if off > 0.01 * largest:  # of what there was or was given
-        return (
-            f"the angular momentum of hub and structure differs by {100 * off / largest:.2g} % from the impulse of the "
-            f'torque: {cause}; give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'
-        )
-    share = growth_on_hub(history, between) if system.inner.model.driven_by_hub else 0.0
-    said = (
-        f"the energy of hub and structure has grown by {100 * share:.2g} % of the energy exchanged beyond the work of "
-        f"the torque: {cause}, or are unstable; give a smaller time.step or more motion.hub_inertia"
-    )
-    return said if share >= GROWN else ""
-
-
-def with_cause(
-    error: ComputationError, system: Any, history: dict[str, Array], between: bool = False
-) -> ComputationError:
-    """Return a failure of a history, with the energy that it had gained before as its cause."""
-    cause = energy_warning(system, history, between)
-    if not cause or type(error) is not ComputationError:
-        return error
-    why, _, advice = cause.partition("; ")
-    return ComputationError(f"{error.what}; before that {why}", time=error.time, advice=advice.removeprefix("give "))
 
 
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:

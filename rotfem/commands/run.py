@@ -23,7 +23,6 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
-from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise, hints_of_start
 from rotfem.commands.checkpoint import Memory
@@ -232,9 +231,6 @@ class Simulation:
         log.warnings += [] if self.stepper is None else self.stepper.warnings()
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
-        if failure is None and self.stepper is not None:
-            grown = monitor.energy_warning(self.system, history, self.rows is not None)
-            log.warnings += [grown] if grown else []
         watched = self.monitor
         if status == "done" and watched.since is not None:
             log.warnings.append(
@@ -274,7 +270,7 @@ class Simulation:
         if switches is not None and step and self.last is not None and switches.ahead(self.last, step):
             what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)
-        return monitor.with_cause(error, self.system, self.record.history.arrays(), self.rows is not None)
+        return error
 
     @property
     def _wants_error(self) -> bool:

@@ -292,16 +292,6 @@ class Model:
         sprung = self.fixed and bool(self.structure.hinges)  # the hub turns their springs
         return motion.hub is None and motion.constant and not (turning or sprung) and steady and dead and known
 
-    @cached_property
-    def driven_by_hub(self) -> bool:
-        """Whether nothing but torque and brake of a free hub gives energy to it and the structure, which feels it."""
-        loads, motion = self.problem.loads, self.motion
-        none = all(load.is_zero for load in loads.named.values()) and not np.any(loads.gravity)
-        passive = (e.momentum or e.passive or (e.potential and not e.internal) for e in self.acting.values() if e.work)
-        known = all(passive)
-        whole = "hub_coupling" in self.effects
-        return motion.hub is not None and not motion.is_accelerated and none and known and whole
-
     def outputs(self) -> dict[str, Any]:
         """Return name ↦ UFL form of the functionals that are to be recorded."""
         out = {}
