@@ -12,7 +12,8 @@ soft strains, the effects, and the stress of the state on the second derivative 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import basix.ufl
@@ -35,26 +36,6 @@ from rotfem.numerics.linear import ROUNDED, set_diagonal
 from rotfem.numerics.projection import sparse_part, summed
 
 Array = npt.NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Saddle:
-    """Matrices over (x, e), and what they are made of.
-
-    Attributes:
-        M, C, K: PETSc matrices; owned unknowns are those of x, then those of e.
-        factors: the same matrix K without K_rest: each entry is one product, rounded relative to itself.
-        rest: K_rest.
-        stressed: geometric stiffness of x per unit strain of the state, whose own round-off is one of numbers of order
-            one; None of a state without stress.
-    """
-
-    M: Any
-    C: Any
-    K: Any
-    factors: Any
-    rest: Any
-    stressed: Any = None
 
 
 class Resultants:
@@ -117,8 +98,17 @@ class Resultants:
         form = self._at_rest(out)
         return None if form.empty() else forms.form(form, once=True)
 
-    def at_state(self, M: Any, C: Any) -> Saddle:
-        """Return the matrices at the state and time set in the system, given its M and C."""
+    def at_state(self, M: Any, C: Any, unit: float) -> tuple[Pencil, Any]:
+        """Return the pencil over (x, e) at the state and time set in the system, given its M and C.
+
+        With it the geometric stiffness of x per unit strain of the state, whose own round-off is one of numbers of
+        order one; None of a state without stress.
+
+        Args:
+            M: mass matrix.
+            C: gyroscopic and damping matrix.
+            unit: size of the frequencies, 1/s.
+        """
         system = self.system
         self._state.x.array[:] = system.q.x.array
         rest = M.duplicate()
@@ -142,14 +132,15 @@ class Resultants:
             rows.append(R)
             blocks.append(W)
         zero, apart = [_empty(W) for W in blocks], [None for W in blocks]
-        factors = _bordered(_empty(M), rows, blocks)
-        of_mass, of_damping = (_bordered(A, apart, zero) for A in (M, C))
-        stressed = None
+        K, factors = (_bordered(corner, rows, blocks) for corner in (rest, _empty(M)))
+        pencil = Pencil(_bordered(M, apart, zero), _bordered(C, apart, zero), K)
+        scale(pencil, rest, factors, unit)
         has_stress = system.prestressed if system.linear else bool(np.any(self._state.x.array))
-        if self._stressed is not None and system.comm.allreduce(has_stress, op=MPI.LOR):
-            stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
-            stressed.assemble()
-        return Saddle(of_mass, of_damping, _bordered(rest, rows, blocks), factors, rest, stressed)
+        if self._stressed is None or not system.comm.allreduce(has_stress, op=MPI.LOR):
+            return pencil, None
+        stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
+        stressed.assemble()
+        return pencil, stressed
 
 
 def _empty(A: Any) -> Any:
@@ -181,7 +172,10 @@ class KeptDigits:
 
     def __init__(self, system: Any):
         self.system, self.used = system, False
-        self._resultants: Resultants | None = None
+
+    @cached_property
+    def _resultants(self) -> Resultants:
+        return Resultants(self.system)
 
     def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
         """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them.
@@ -196,10 +190,7 @@ class KeptDigits:
             return pairs
         if self._in_damping(pairs, count) > 0.1:  # nothing is gained
             return pairs
-        if self._resultants is None:
-            self._resultants = Resultants(self.system)
-        saddle = self._resultants.at_state(pencil.M, pencil.C)
-        kept = saddle_pencil(saddle, pencil.unit or 1.0)
+        kept, stressed = self._resultants.at_state(pencil.M, pencil.C, pencil.unit or 1.0)
         try:
             found = kept.solve(count)
         except ComputationError:
@@ -212,8 +203,8 @@ class KeptDigits:
 
         eta = self.system.model.mechanics.damping.stiffness
         left_out: Array = np.zeros(len(bounds))
-        if saddle.stressed is not None:
-            left_out += ROUNDED * np.abs(products(pencil.apply(saddle.stressed, right)))
+        if stressed is not None:
+            left_out += ROUNDED * np.abs(products(pencil.apply(stressed, right)))
         if eta is not None:  # C = η K + … is summed as K was
             left_out += np.abs(float(eta.value) * found.values) * RoundOff(pencil).stiffness(left, right)
         if np.any(left_out):
@@ -239,36 +230,33 @@ def _digits(bounds: Array) -> float:
     return -float(np.mean(np.log10(np.maximum(bounds, np.finfo(float).eps)))) if len(bounds) else 0.0
 
 
-def saddle_pencil(saddle: Saddle, unit: float) -> Pencil:
-    """Return the pencil of a saddle form, its unknowns scaled so that neither stiff nor soft strains are lost.
+def scale(pencil: Pencil, rest: Any, factors: Any, unit: float) -> None:
+    """Scale the unknowns of a pencil over (x, e) so that neither stiff nor soft strains are lost.
 
-    Unknowns are scaled by what soft strains, or where there are none the inertia at a frequency of the size wanted,
+    Those of x are scaled by what soft strains, or where there are none the inertia at a frequency of the size wanted,
     make of them; the equation of each strain by its largest entry.
 
     Args:
-        saddle: the matrices.
+        pencil: the matrices.
+        rest: K_rest.
+        factors: K without K_rest: each entry is one product, rounded relative to itself. It is overwritten.
         unit: size of the frequencies, 1/s.
     """
-    pencil = Pencil(saddle.M, saddle.C, saddle.K)
-    n = saddle.rest.getLocalSize()[0]
-    d, mass = saddle.K.createVecRight(), saddle.M.getDiagonal().array[:n]
-    rest = np.abs(saddle.rest.getDiagonal().array)
-    size = np.maximum(rest, unit**2 * np.abs(mass))
+    indptr, indices, data = factors.getValuesCSR()
+    factors.setValuesCSR(indptr, indices, np.abs(data))
+    factors.assemble()
+    n, d = rest.getLocalSize()[0], pencil.K.createVecRight()
+    soft, mass = np.abs(rest.getDiagonal().array), pencil.M.getDiagonal().array[:n]
+    size = np.maximum(soft, unit**2 * np.abs(mass))
     d.array[:] = 1.0
     d.array[:n] = power_of_two(1.0 / np.sqrt(np.where(size > 0.0, size, 1.0)))
-    rows, first = saddle.factors.copy(), d.copy()
+    rows, first = factors.copy(), d.copy()
     first.array[n:] = 0.0
     rows.diagonalScale(None, first)
     indptr, indices, data = rows.getValuesCSR()
     shape = len(indptr) - 1, rows.getSize()[1]
-    strains = csr_array((np.abs(data), indices, indptr), shape=shape).max(axis=1).toarray().ravel()[n:]
+    strains = csr_array((data, indices, indptr), shape=shape).max(axis=1).toarray().ravel()[n:]
     d.array[n:] = power_of_two(1.0 / np.where(strains > 0.0, strains, 1.0))
-    pencil.unknowns, pencil.pivots, pencil.unit = d, True, unit
-    factors = saddle.factors.copy()
-    indptr, indices, data = factors.getValuesCSR()
-    factors.setValuesCSR(indptr, indices, np.abs(data))
-    factors.assemble()
-    pencil.factors = factors
+    pencil.unknowns, pencil.pivots, pencil.unit, pencil.factors = d, True, unit, factors
     pencil.sizes = np.zeros(d.getLocalSize())
-    pencil.sizes[:n] = np.sqrt(rest)
-    return pencil
+    pencil.sizes[:n] = np.sqrt(soft)

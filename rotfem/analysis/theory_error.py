@@ -24,8 +24,8 @@ that nothing holds by r t²/2m in the time t. So K + 2M/t² is in the place of K
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -109,124 +109,115 @@ class TheoryError:
         return TheoryError(self.estimate + apart, f'its answer against that of "{self.theory}"', theory.name, listed)
 
 
-class TheoryCheck:
-    """Estimates the error at a state of a linear theory with stress stiffness; compiles what it needs when it needs it.
+def is_estimated(system: Any) -> bool:
+    """Return whether the error of a system's theory is estimated at states, and there are strains to do it by."""
+    theory, kind = system.model.theory, system.structure.type
+    if theory.exact or compared(theory, kind) is not None:
+        return False
+    return richest().holds_for(kind) and kind in stiffened().prestress
+
+
+def error_of_state(system: Any, q: Array, tips: Array | None = None, time: float = np.inf) -> TheoryError:
+    """Return the error of the displacements of a state, whose time is set, by a linear theory with stress stiffness.
 
     Args:
         system: equations of motion, the hub held.
+        q: the state, a local dof array.
+        tips: sizes that the components of the tip have (m, rad), (components,); those of the state if None.
+        time: that the error has had to grow (s); of an equilibrium it is all there.
     """
+    name = system.model.theory.name
+    if not is_estimated(system):
+        exact = system.model.theory.exact
+        return TheoryError(0.0, "its strains are exact" if exact else "there is none to compare it with", name)
+    displacement, rotation = _sizes(system, q)
+    if displacement == 0.0:
+        return TheoryError(rotation / 2, f"the largest rotation is {rotation:.2g}", name)
+    tips = np.abs(_tip(system, q)) if tips is None else tips
+    moves, neglected = np.array(system.structure.moves), max(displacement, rotation) / 2
+    largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
+    resolved = tips > RESOLVED * largest  # more than round-off of displacements or of rotations
+    small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
+    if small:
+        return TheoryError(neglected, f"the largest rotation is {rotation:.2g}", name)
+    r = _residual(system, q)
+    K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
+    change = -Increment(system.V).solve(DirectSolver(K), r).copy()
+    smaller = min(displacement, _sizes(system, q + change)[0])  # of the states before and after
+    estimate = _sizes(system, change)[0] / max(smaller, 1e-300)
+    if rotation > 1.0:  # expansions in it converge too slowly for an estimate
+        estimate = max(estimate, rotation)
+    if system.model.problem.inactive:  # among them are the displacements that bending makes along the structure
+        estimate = max(estimate, rotation / 2)
+    errors = np.abs(_tip(system, change))[resolved] / tips[resolved]
+    names = [f"tip_{component}" for component in np.array(system.structure.components)[resolved]]
+    wrong = {component: float(x) for component, x in zip(names, errors, strict=True) if x > REPORTED}
+    return TheoryError(float(estimate), "its strains against the exact ones at the farthest state", name, wrong)
 
-    def __init__(self, system: Any):
-        self.system, self.structure = system, system.structure
-        self.theory = system.model.theory
-        self._form: Any = None
 
-    @cached_property
-    def known(self) -> bool:
-        """Whether there is anything to estimate, and strains to do it by."""
-        kind = self.structure.type
-        if self.theory.exact or compared(self.theory, kind) is not None:
-            return False
-        return richest().holds_for(kind) and kind in stiffened().prestress
+def error_under_load(system: Any, motion: Motion, factor: DirectSolver | None = None) -> TheoryError:
+    """Return the error of the displacements under what is constant, which modes of a linear theory are not about.
 
-    def of_state(self, q: Array, tips: Array | None = None, time: float = np.inf) -> TheoryError:
-        """Return the error of the displacements of a state, whose time is set.
+    Args:
+        system: equations of motion, the hub held.
+        motion: of the frame, at the speed of the modes.
+        factor: solver with the stiffness there, if there is one.
+    """
+    system.set_time(0.0, motion)
+    system.set_state(system.zeros())
+    return error_of_state(system, _static(system, factor) if is_estimated(system) else system.zeros())
 
-        Args:
-            q: the state, a local dof array.
-            tips: sizes that the components of the tip have (m, rad), (components,); those of the state if None.
-            time: that the error has had to grow (s); of an equilibrium it is all there.
-        """
-        if not self.known:
-            return self._as(0.0, "its strains are exact" if self.theory.exact else "there is none to compare it with")
-        displacement, rotation = self._sizes(q)
-        if displacement == 0.0:
-            return self._as(rotation / 2, f"the largest rotation is {rotation:.2g}")
-        tips = np.abs(self._tip(q)) if tips is None else tips
-        moves, neglected = np.array(self.structure.moves), max(displacement, rotation) / 2
-        largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
-        resolved = tips > RESOLVED * largest  # more than round-off of displacements or of rotations
-        small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
-        if small:
-            return self._as(neglected, f"the largest rotation is {rotation:.2g}")
-        return self._computed(q, tips, resolved, rotation, time)
 
-    def _computed(self, q: Array, tips: Array, resolved: Any, rotation: float, time: float) -> TheoryError:
-        """Return the error by the correction Δq of a state."""
-        system, model = self.system, self.system.model
-        r = self._residual(q)
-        K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
-        change = -Increment(system.V).solve(DirectSolver(K), r).copy()
-        smaller = min(self._sizes(q)[0], self._sizes(q + change)[0])  # of the states before and after
-        estimate = self._sizes(change)[0] / max(smaller, 1e-300)
-        if rotation > 1.0:  # expansions in it converge too slowly for an estimate
-            estimate = max(estimate, rotation)
-        if model.problem.inactive:  # among them are the displacements that bending makes along the structure
-            estimate = max(estimate, rotation / 2)
-        errors = np.abs(self._tip(change))[resolved] / tips[resolved]
-        names = [f"tip_{name}" for name in np.array(self.structure.components)[resolved]]
-        wrong = {name: float(x) for name, x in zip(names, errors, strict=True) if x > REPORTED}
-        return replace(self._as(estimate, "its strains against the exact ones at the farthest state"), components=wrong)
+def static_rotation(system: Any, end: float) -> float:
+    """Return the largest rotation (rad) of shapes that rest in the frame under what acts on them at some instants.
 
-    def _tip(self, x: Array) -> Array:
-        """Return all components of a displacement at the tip, relative to the turning frame."""
-        whole = self.structure.whole_values(self.structure.tip_values(x))
-        return np.asarray(self.system.seen_from_hub(whole[None, :], self.structure.length, self.system.time)[0])
-
-    def under_load(self, motion: Motion, factor: DirectSolver | None = None) -> TheoryError:
-        """Return the error of the displacements under what is constant, which modes of a linear theory are not about.
-
-        Args:
-            motion: of the frame, at the speed of the modes.
-            factor: solver with the stiffness there, if there is one.
-        """
-        system, out = self.system, Increment(self.system.V)
-        system.set_time(0.0, motion)
+    Args:
+        system: equations of motion, the hub held.
+        end: last of them, s.
+    """
+    largest = 0.0
+    for t in np.linspace(0.0, end, 17):
+        system.set_time(float(t))
         system.set_state(system.zeros())
-        if not self.known:
-            return self.of_state(system.zeros())
-        solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))
-        return self.of_state(out.solve(solver, system.residual()).copy())
+        largest = max(largest, _sizes(system, _static(system))[1])
+    return largest
 
-    def static_rotation(self, end: float) -> float:
-        """Return the largest rotation (rad) of shapes that rest in the frame under what acts on them at some instants.
 
-        Args:
-            end: last of them, s.
-        """
-        system, found, out = self.system, [0.0], Increment(self.system.V)
-        for t in np.linspace(0.0, end, 17):
-            system.set_time(float(t))
-            system.set_state(system.zeros())
-            q = out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual())
-            found.append(self._sizes(q)[1])
-        return max(found)
+def _static(system: Any, factor: DirectSolver | None = None) -> Array:
+    """Return what the forces at the undeformed state and time set displace the structure by, a local dof array."""
+    solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))
+    return Increment(system.V).solve(solver, system.residual()).copy()
 
-    def _as(self, estimate: float, basis: str) -> TheoryError:
-        return TheoryError(float(estimate), basis, self.theory.name)
 
-    def _sizes(self, q: Array) -> tuple[float, float]:
-        """Return the size of displacements over L, and the largest rotation component (rad)."""
-        sizes, moves = np.asarray(self.system.sizes(q)), np.array(self.structure.moves)
-        return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
+def _tip(system: Any, x: Array) -> Array:
+    """Return all components of a displacement at the tip, relative to the turning frame."""
+    structure = system.structure
+    whole = structure.whole_values(structure.tip_values(x))
+    return np.asarray(system.seen_from_hub(whole[None, :], structure.length, system.time)[0])
 
-    def _residual(self, q: Array) -> Any:
-        """Return r at a state, a PETSc vector, zero at clamped unknowns; the state is set."""
-        system, model, test = self.system, self.system.model, ufl.TestFunction(self.system.V)
-        if self._form is None:
-            k, self._state = self.structure.k, fem.Function(system.V)
-            work = [-1 * geometric_stiffness(model, (system.q, self._state), test, self._state, stiffened())]
-            exact = model.strains(richest().measures(self.structure.type))
-            for own, other in zip(model.mechanics.strains, exact, strict=True):
-                lack = other.value - own.value
-                work.append(ufl.inner(own.force(lack), k.variation(own.value)) * own.measure)
-                work.append(ufl.inner(own.force(own.value), k.variation(lack)) * own.measure)
-            whole = added(work)
-            vanishes = isinstance(whole, int) or expand_derivatives(whole).empty()
-            self._form = () if vanishes else forms.form(whole, once=True)
-        system.set_state(q)
-        self._state.x.array[:] = q
-        return assembled(self._form, system.V, system.clamped) if self._form != () else compat.create_vector(system.V)
+
+def _sizes(system: Any, q: Array) -> tuple[float, float]:
+    """Return the size of displacements over L, and the largest rotation component (rad)."""
+    sizes, moves = np.asarray(system.sizes(q)), np.array(system.structure.moves)
+    return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
+
+
+def _residual(system: Any, q: Array) -> Any:
+    """Return r at a state, a PETSc vector, zero at clamped unknowns; the state is set."""
+    model, k, test = system.model, system.structure.k, ufl.TestFunction(system.V)
+    state = fem.Function(system.V)
+    work = [-1 * geometric_stiffness(model, (system.q, state), test, state, stiffened())]
+    exact = model.strains(richest().measures(system.structure.type))
+    for own, other in zip(model.mechanics.strains, exact, strict=True):
+        lack = other.value - own.value
+        work.append(ufl.inner(own.force(lack), k.variation(own.value)) * own.measure)
+        work.append(ufl.inner(own.force(own.value), k.variation(lack)) * own.measure)
+    whole = added(work)
+    system.set_state(q)
+    state.x.array[:] = q
+    if isinstance(whole, int) or expand_derivatives(whole).empty():
+        return compat.create_vector(system.V)
+    return assembled(forms.form(whole, once=True), system.V, system.clamped)
 
 
 class Farthest:
@@ -259,11 +250,10 @@ class Farthest:
             tips: largest size of every component of the tip in the motion (m, rad); those of the state if None.
             from_rest: whether the motion began undeformed, without an error.
         """
-        check = TheoryCheck(system.held)
-        if not check.known:
-            return check.of_state(system.held.zeros())
-        time = self.seen[1] if from_rest else np.inf
-        return self._there(system.held, partial(check.of_state, tips=tips, time=time))
+        held, time = system.held, self.seen[1] if from_rest else np.inf
+        if not is_estimated(held):
+            return error_of_state(held, held.zeros())
+        return self._there(held, partial(error_of_state, held, tips=tips, time=time))
 
     def conditioning(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that is unknown."""

@@ -14,7 +14,7 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
-from rotfem.analysis.theory_error import RESOLVED, TheoryCheck, TheoryError
+from rotfem.analysis.theory_error import RESOLVED, TheoryError, static_rotation
 from rotfem.commands.first_state import Start
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.recorder import accuracy_of
@@ -272,7 +272,7 @@ def check_rotations(scene: Scene, system: Any) -> None:
     """
     if scene.time is None or scene.accuracy is None or system.hub is not None:
         return
-    rotation = TheoryCheck(system).static_rotation(scene.time.end)
+    rotation = static_rotation(system, scene.time.end)
     if rotation**2 / 2 > scene.accuracy:
         raise ComputationError(f"rotations of about {rotation:.2g} are too large for {scene.model.theory}")
 

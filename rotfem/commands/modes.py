@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed, stability_of_pencil
-from rotfem.analysis.theory_error import TheoryCheck, TheoryError
+from rotfem.analysis.theory_error import TheoryError, error_under_load
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise
 from rotfem.commands.error_report import error_of_modes
@@ -145,14 +145,14 @@ def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | N
     """Return the error of the frequencies at one speed by the theory; None where it is not known, or not wanted."""
     richer, motion = richer_problem(analysis.problem), analysis.system.held.motion.at_speed(spinning.speed)
     if richer is None:
-        return TheoryCheck(analysis.system.held).under_load(motion, spinning.clamped.factor)
+        return error_under_load(analysis.system.held, motion, spinning.clamped.factor)
     if not analysis.estimates:
         return None
     errors = FrequencyErrors(analysis, richer)
     differences = [error for error in errors(spinning) if error is not None]
     if errors.there is None or len(differences) < len(spinning.pairs.values):
         return None
-    own = TheoryCheck(errors.there.system.held).under_load(motion)
+    own = error_under_load(errors.there.system.held, motion)
     return own.of_poorer(analysis.problem.theory, max(differences, default=0.0), {})
 
 

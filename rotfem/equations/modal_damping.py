@@ -27,6 +27,9 @@ from rotfem.numerics.ritz import MORE
 
 Array = npt.NDArray[np.float64]
 
+#: One for all of the first modes, one each for them, or for those of families.
+Ratios = float | tuple[float, ...] | Mapping[str, tuple[float, ...]]
+
 #: The effect that it is part of.
 EFFECT = "damping"
 
@@ -155,55 +158,47 @@ def damping_by_mode(system: Any) -> ByMode | None:
     ratios = damping.modal
     if system.model.fixed:
         raise InputError(KEY, ratios, 'needs model.frame = "rotating": modes at rest turn with the hub')
-    modes, zeta = of_families(system, ratios) if isinstance(ratios, Mapping) else in_order(system, ratios)
+    modes, zeta = damped_modes(system, ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
     return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], system.A)
 
 
-def in_order(system: Any, ratios: float | tuple[float, ...]) -> tuple[ModesAtRest, Array]:
-    """Return (modes, their ratios) in the order of frequency.
+def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
+    """Return (modes, their ratios) in the order of frequency, or of each family in that order.
+
+    A mode is in the family that has most of its energy.
 
     Raises:
-        InputError: there are fewer modes than ratios, of a model with all its effects.
+        InputError: there is no such family, or there are fewer modes than ratios, of a model with all its effects.
     """
-    several = isinstance(ratios, tuple)
-    wanted = np.array(ratios if several else [ratios] * FIRST)
-    modes = modes_at_rest(system, len(wanted))
-    there = len(modes.omega)
-    if several and there < len(wanted) and is_whole(system):
-        raise InputError(KEY, ratios, f"has more ratios than there are modes on this mesh: {there}")
-    return modes, wanted[:there]
-
-
-def of_families(system: Any, ratios: Mapping[str, tuple[float, ...]]) -> tuple[ModesAtRest, Array]:
-    """Return (modes, their ratios), each mode in the family that has most of its energy, in order of frequency there.
-
-    Raises:
-        InputError: there is no such family, or it has fewer modes than ratios, of a model with all its effects.
-    """
-    known = system.structure.families
-    for name in ratios:
-        if name not in known:
-            why = f"a {system.structure.type} has no such family; allowed: {', '.join(known)}"
-            raise InputError(f"{KEY}.{name}", list(ratios[name]), why)
-    count = FIRST + sum(len(given) for given in ratios.values())
+    known, several = system.structure.families, isinstance(ratios, Mapping | tuple)
+    if isinstance(ratios, Mapping):
+        named = {f"{name} ": given for name, given in ratios.items()}
+        for name in ratios:
+            if name not in known:
+                why = f"a {system.structure.type} has no such family; allowed: {', '.join(known)}"
+                raise InputError(f"{KEY}.{name}", list(ratios[name]), why)
+    else:
+        named = {"": ratios if isinstance(ratios, tuple) else (ratios,) * FIRST}
+    count = sum(map(len, named.values())) + (FIRST if isinstance(ratios, Mapping) else 0)
     while True:
         modes = modes_at_rest(system, count)
         energies = family_products(system, modes.shapes, modes.massed)
         leading = np.argmax([np.diag(energy) for energy in energies.values()], axis=0)
-        of = {name: np.flatnonzero(leading == i) for i, name in enumerate(energies)}
-        if all(len(of[name]) >= len(given) for name, given in ratios.items()):
+        of = {f"{name} ": np.flatnonzero(leading == i) for i, name in enumerate(energies)}
+        of[""] = np.arange(len(leading))
+        short = [name for name, given in named.items() if len(of[name]) < len(given)]
+        if not short or (len(modes.omega) < count and not (several and is_whole(system))):
             break
         if len(modes.omega) < count:
-            if not is_whole(system):
-                break
-            name = next(name for name, given in ratios.items() if len(of[name]) < len(given))
-            why = f"has more ratios than there are {name} modes on this mesh: {len(of[name])}"
-            raise InputError(f"{KEY}.{name}", list(ratios[name]), why)
+            name = short[0]
+            value = list(named[name]) if name else ratios
+            why = f"has more ratios than there are {name}modes on this mesh: {len(of[name])}"
+            raise InputError(f"{KEY}.{name}".rstrip(". "), value, why)
         count *= 2
     zeta = np.zeros(len(modes.omega))
-    for name, given in ratios.items():
+    for name, given in named.items():
         found = of[name][: len(given)]
         zeta[found] = given[: len(found)]
     return modes, zeta

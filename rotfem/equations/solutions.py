@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import ComplexSolver, DirectSolver, Increment, SingularSolver, combine, is_regular
+from rotfem.numerics.projection import with_ghosts
 
 Array = npt.NDArray[Any]
 
@@ -182,7 +183,6 @@ class Linearised:
         self._matrices = tuple(reversed(system.held.mass_damping_stiffness()))
         self._shift: float | None = None
         self._part = Increment(system.held.V)
-        self._owned = len(self._matrices[0].createVecLeft().array)
         self._real_matrix = self._matrices[0].duplicate()
         self._real = DirectSolver(self._real_matrix)
         self._complex = ComplexSolver(self._matrices)
@@ -200,19 +200,9 @@ class Linearised:
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
         self._b.array[:] = real
-        return self._part.solve(self._real, self._b).copy(), self._local(self._complex.solve(complex_))
-
-    def _local(self, owned: Array) -> Array:
-        """Return an owned complex array with the ghosts of other ranks."""
-        if self.system.held.comm.size == 1:
-            return owned
-        parts = []
-        for part in (owned.real, owned.imag):
-            x = self._part.function.x
-            x.array[: self._owned] = part
-            x.scatter_forward()
-            parts.append(x.array.copy())
-        return np.asarray(parts[0] + 1j * parts[1])
+        found = self._complex.solve(complex_)
+        parts = with_ghosts(self.system.held.V, np.column_stack([found.real, found.imag]))
+        return self._part.solve(self._real, self._b).copy(), parts[:, 0] + 1j * parts[:, 1]
 
 
 class BorderedLinearised(Linearised):

@@ -126,44 +126,32 @@ class Stations:
         left, right = cells.min(axis=1), cells.max(axis=1)
         found = np.searchsorted(left, self.positions + AT_END * (right - left).min(), side="right") - 1
         found = np.clip(found, 0, len(left) - 1)
-        gauss = cells[:, :1] + self._points[:, 0] * (cells[:, 1:] - cells[:, :1])
-        patches = [self._patch(int(c), left, right) for c in found]
-        needed = np.unique(np.concatenate(patches))
-        place = {int(c): n for n, c in enumerate(needed)}
+        points = (cells[:, :1] + self._points[:, 0] * (cells[:, 1:] - cells[:, :1])).ravel()
+        along = np.argsort(points)
+        near = np.abs(np.subtract.outer(left, self.beam.knots)).min(axis=1, initial=np.inf)
+        smooth = np.repeat(np.cumsum(near <= AT_END * (right - left)), self.degree)  # its number, of every point
+        chosen = [along[self._around(int(c), smooth)] for c in found]
+        needed = np.unique(np.concatenate(chosen) // self.degree)
         self._stress = np.zeros((len(found), len(needed), self.degree))
-        for row, (c, patch, x) in enumerate(zip(found, patches, self.positions, strict=True)):
-            chosen = self._chosen(int(c), patch, gauss)
-            values = weights(np.array([gauss[cell, i] for cell, i in chosen]), float(x))
-            for (cell, i), value in zip(chosen, values, strict=True):
-                self._stress[row, place[cell], i] = value
+        for row, numbers, x in zip(self._stress, chosen, self.positions, strict=True):
+            cell, i = np.divmod(numbers, self.degree)
+            row[np.searchsorted(needed, cell), i] = weights(points[numbers], float(x))
         here = owner[needed] == comm.rank
         self._rows, self._cells = np.flatnonzero(here), local[needed[here]].astype(np.int32)
         self._shape = len(needed), self.degree
         self._interpolate(found, cells, owner, local)
 
-    def _patch(self, cell: int, left: Array, right: Array) -> list[int]:
-        """Return the cell and up to two on each side of it between which nothing jumps."""
-        knots = self.beam.knots
-        out = [cell]
-        for step, ends in ((-1, left), (1, right)):
-            for there in (cell, cell + step):
-                near = AT_END * (right[there] - left[there])
-                if not 0 <= there + step < len(left) or any(abs(x - ends[there]) <= near for x in knots):
-                    break
-                out.append(there + step)
-        return out
+    def _around(self, cell: int, smooth: Array) -> list[int]:
+        """Return places, from the root on, of the Gauss points of a cell and of the two nearest ones, one on each side.
 
-    def _chosen(self, cell: int, patch: list[int], gauss: Array) -> list[tuple[int, int]]:
-        """Return (cell, point) of the points of a polynomial: those of its cell, and the two nearest, one a side."""
-        own = [(cell, i) for i in range(self.degree)]
-        middle = float(gauss[cell].mean())
-        sides: tuple[list[tuple[float, int, int]], ...] = ([], [])
-        for other in patch[1:]:
-            for i, x in enumerate(gauss[other]):
-                sides[int(x > middle)].append((abs(x - middle), other, i))
-        low, high = (sorted(side) for side in sides)
-        taken = [*low[:1], *high[:1]] if low and high else (low or high)[:2]
-        return own + [(other, i) for _, other, i in taken]
+        Where something jumps on one side, so that its numbers in `smooth` differ, both are on the other one.
+        """
+        own = [*range(cell * self.degree, (cell + 1) * self.degree)]
+        low, high = (
+            [n for n in places if 0 <= n < len(smooth) and smooth[n] == smooth[own[0]]]
+            for places in ((own[0] - 1, own[0] - 2), (own[-1] + 1, own[-1] + 2))
+        )
+        return own + ([low[0], high[0]] if low and high else low or high)
 
     def _interpolate(self, found: Array, cells: Array, owner: Array, local: Array) -> None:
         """Find the nodes and the values of their functions at the stations in cells of this process."""

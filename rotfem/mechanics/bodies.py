@@ -133,11 +133,11 @@ class AppliedLoad(Moved):
 
 
 @dataclass(frozen=True)
-class RootSpring:
+class RootSpring(Moved):
     """A spring and a damper against a turn of the root.
 
     Attributes:
-        turn: the angle as an expression of q, rad.
+        x: the angle as an expression of q, rad.
         stiffness: N·m/rad, a constant.
         damping: N·m·s/rad, a constant.
         measure: UFL measure of the root.
@@ -145,7 +145,7 @@ class RootSpring:
         drift: rate of the angle at rest in the frame (rad/s), where the frame pitches and the axis does not.
     """
 
-    turn: Any
+    x: Any
     stiffness: Any
     damping: Any
     measure: Any

@@ -49,6 +49,16 @@ class RigidTurn:
         return moving.rigid_turn(self.e)
 
 
+class Place:
+    """x in the place of its variation: what the work of a force or a spring is then, is linear or square in x."""
+
+    within_frame = True
+
+    def of(self, moving: Moved) -> Any:
+        """Return x of a body, or of what a load works on."""
+        return moving.x
+
+
 @dataclass(frozen=True)
 class Mechanics:
     """What effects act on.
@@ -93,13 +103,13 @@ class Mechanics:
         """
         held: list[RootSpring] = self.structure.springs()
         if self.frame.fixed:
-            return [replace(s, turn=s.turn - self.frame.psi, drift=-self.frame.w[2]) for s in held]
-        turns = {s.axis: s.turn for s in held}
+            return [replace(s, x=s.x - self.frame.psi, drift=-self.frame.w[2]) for s in held]
+        turns = {s.axis: s.x for s in held}
         if not self.frame.pitching or not {2, 3} <= turns.keys():
             return held
         (c, s), (dc, ds), flap, lag = self.frame.pitch, self.frame.pitch_rate, turns[2], turns[3]
         still = {2: (c * flap - s * lag, dc * flap - ds * lag), 3: (c * lag + s * flap, dc * lag + ds * flap)}
-        return [replace(x, turn=still[x.axis][0], drift=still[x.axis][1]) if x.axis in still else x for x in held]
+        return [replace(y, x=still[y.axis][0], drift=still[y.axis][1]) if y.axis in still else y for y in held]
 
     def positions(self) -> list[Body]:
         """Return the bodies of the structure itself that are points of it, not directors: its axis or mid-surface."""
@@ -149,14 +159,14 @@ def damping(m: Mechanics, delta: Variation) -> Any:
     return added(work)
 
 
-def root_springs(m: Mechanics, delta: Variation) -> Any:
+def root_springs(m: Mechanics, delta: Any) -> Any:
     """Return Σ k φ δφ over the turns φ that the root makes against springs."""
-    return added(s.stiffness * s.turn * m.k.variation(s.turn) * s.measure for s in m.springs())
+    return added(s.stiffness * s.x * delta.of(s) * s.measure for s in m.springs())
 
 
 def root_dampers(m: Mechanics, delta: Variation) -> Any:
     """Return Σ c φ̇ δφ over the turns φ that the root makes against dampers."""
-    return added(s.damping * (m.k.rate(s.turn) + s.drift) * m.k.variation(s.turn) * s.measure for s in m.springs())
+    return added(s.damping * (m.k.rate(s.x) + s.drift) * delta.of(s) * s.measure for s in m.springs())
 
 
 def supports(m: Mechanics, delta: Any) -> Any:
@@ -216,26 +226,17 @@ def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
     }
 
 
-def potential_of_base(m: Mechanics) -> Any:
-    """Return ∫ ρ a_o·x over the positions."""
-    return added(b.density * ufl.inner(m.frame.a_o, b.x) * b.measure for b in m.bodies if b.is_position)
+def _potential_of(work: Callable[[Mechanics, Any], Any], part: float) -> Callable[[Mechanics], Any]:
+    """Return mechanics ↦ a part of an effect's work on the places themselves: all of a force's, half of a spring's."""
+    return lambda m: part * work(m, Place())
 
 
-def potential_of_gravity(m: Mechanics) -> Any:
-    """Return −∫ ρ g·x over the positions."""
-    return added(-b.density * ufl.inner(m.frame.gravity, b.x) * b.measure for b in m.bodies if b.is_position)
-
-
-def potential_of_root_springs(m: Mechanics) -> Any:
-    """Return Σ ½ k φ² over the springs of the root."""
-    return added(s.stiffness * s.turn**2 / 2 * s.measure for s in m.springs())
-
-
-def potential_of_supports(m: Mechanics) -> Any:
-    """Return Σ ½ k |x|² over the supports of a shaft."""
-    return added(s.stiffness[0] * ufl.inner(s.x, s.x) / 2 * s.measure for s in m.structure.supports())
+potential_of_base = _potential_of(base, 1.0)
+potential_of_gravity = _potential_of(gravity, 1.0)
+potential_of_root_springs = _potential_of(root_springs, 0.5)
+potential_of_supports = _potential_of(supports, 0.5)
 
 
 def potential_of_loads(m: Mechanics) -> Any:
     """Return −Σ ∫ force·x over the dead loads."""
-    return added(-ufl.inner(load.force, load.x) * load.measure for load in m.loads if load.dead)
+    return loads(replace(m, loads=[load for load in m.loads if load.dead]), Place())

@@ -16,7 +16,7 @@ import ufl
 from dolfinx import fem
 
 from rotfem.mechanics.loads import Load, PlaceLoad, Shapes
-from rotfem.structures.section_fields import SectionField
+from rotfem.structures.section_fields import field_values
 
 Array = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class SpanField(Amplitude):
             def at(x: Array, near: Array, shapes: Shapes = shapes) -> Array:
                 return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
 
-            values = SectionField(at, rows, degree).values(f.function_space).reshape(cells.size, -1, n)
+            values = field_values(at, rows, degree, f.function_space).reshape(cells.size, -1, n)
             if shapes.region:
                 there = np.zeros(len(values), dtype=bool)
                 there[cells[structure.cells_of(shapes.region)].ravel()] = True

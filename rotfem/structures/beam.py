@@ -19,7 +19,7 @@ from rotfem.numerics.forms import quadrature_points
 from rotfem.structures.meshes.plate_mesh import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
-from rotfem.structures.section_fields import SectionField, Valid, not_negative
+from rotfem.structures.section_fields import Valid, field_values, not_negative
 from rotfem.structures.structure import Array, Structure, TipValues, check_memory
 
 
@@ -148,11 +148,11 @@ class Beam(Structure):
     def field(
         self, name: str, at: Callable[[Array, Array], Any], degree: int, size: int = 0, valid: Valid | None = None
     ) -> fem.Function:
-        """Return a discontinuous field of a degree (see `SectionField`), with so many components, a scalar for 0."""
+        """Return a discontinuous field of a degree (see `field_values`), with so many components, a scalar for 0."""
         cell = self.mesh.basix_cell()
         space = fem.functionspace(self.mesh, element("DG", cell, degree, shape=(size,) if size else ()))
         f = fem.Function(space, name=name)
-        f.x.array[:] = SectionField(at, self.inner_rows, min(self.degree, degree), valid).values(space).ravel()
+        f.x.array[:] = field_values(at, self.inner_rows, min(self.degree, degree), space, valid).ravel()
         return f
 
     # --- values -------------------------------------------------------------------------------------------------

@@ -14,7 +14,6 @@ so that this rule sees the projection on degree k − 1, which is that of strain
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -34,52 +33,40 @@ Valid = Callable[[Array], bool]
 leggauss = cache(legendre.leggauss)
 
 
-@dataclass(frozen=True)
-class SectionField:
-    """A discontinuous field on a mesh of a beam.
+def field_values(
+    at: Callable[[Array, Array], Any], rows: Array, degree: int, space: fem.FunctionSpace, valid: Valid | None = None
+) -> Array:
+    """Return the values of a property at the nodes of a discontinuous space on a mesh of a beam, (nodes, components).
 
-    Attributes:
+    Args:
         at: (x, near), (n,) in m ↦ values (n,) or (n, components); near are on the side of x that counts at a jump.
         rows: places of the rows (m), increasing.
         degree: k, of the unknowns.
+        space: the space.
         valid: what a projection must be where the table is. Where it is not, as where stiffness falls by orders of
             magnitude within an element, the mean takes its place. None: anything is valid.
     """
-
-    at: Callable[[Array, Array], Any]
-    rows: Array
-    degree: int
-    valid: Valid | None = None
-
-    def values(self, space: fem.FunctionSpace) -> Array:
-        """Return the values at the nodes of a discontinuous space, (nodes, components)."""
-        dofmap, x = space.dofmap.list, space.tabulate_dof_coordinates()[:, 0]
-        middle = np.empty_like(x)
-        middle[dofmap] = x[dofmap].mean(axis=1)[:, None]
-        values = np.array(self.at(x, middle), dtype=np.float64).reshape(len(x), -1)
-        ends = np.sort(space.mesh.geometry.x[space.mesh.geometry.dofmap, 0], axis=1)
-        near = END * float(ends.max())
-        first, last = (np.searchsorted(self.rows, end) for end in (ends[:, 0] + near, ends[:, 1] - near))
-        for cell in np.flatnonzero(last > first):
-            inner, dofs = self.rows[first[cell] : last[cell]], dofmap[cell]
-            values[dofs] = self._projected(ends[cell], inner, x[dofs])
-        return values
-
-    def _projected(self, ends: Array, inner: Array, x: Array) -> Array:
-        """Return the projection at places x (n,) of the element between two ends with rows inside."""
-        (a, b), (xi, w) = ends, leggauss(5)  # exact for a taper of fourth degree times the fifth of polynomials
-        cuts = np.array([a, *inner, b])
+    dofmap, x = space.dofmap.list, space.tabulate_dof_coordinates()[:, 0]
+    middle = np.empty_like(x)
+    middle[dofmap] = x[dofmap].mean(axis=1)[:, None]
+    values = np.array(at(x, middle), dtype=np.float64).reshape(len(x), -1)
+    ends = np.sort(space.mesh.geometry.x[space.mesh.geometry.dofmap, 0], axis=1)
+    near = END * float(ends.max())
+    first, last = (np.searchsorted(rows, end) for end in (ends[:, 0] + near, ends[:, 1] - near))
+    n, (xi, w) = np.arange(degree + 1), leggauss(5)  # exact for a taper of fourth degree times the fifth of polynomials
+    inner = np.concatenate([leggauss(degree + i)[0] for i in (0, 1)])
+    for cell in np.flatnonzero(last > first):
+        (a, b), dofs = ends[cell], dofmap[cell]
+        cuts = np.array([a, *rows[first[cell] : last[cell]], b])
         half = np.diff(cuts)[:, None] / 2
         places = (cuts[:-1, None] + half * (1.0 + xi)).ravel()
-        samples = np.asarray(self.at(places, np.full_like(places, (a + b) / 2))).reshape(len(places), -1)
-        n = np.arange(self.degree + 1)
-        basis = legendre.legvander(2.0 * (places - a) / (b - a) - 1.0, self.degree)
+        samples = np.asarray(at(places, np.full_like(places, (a + b) / 2))).reshape(len(places), -1)
+        basis = legendre.legvander(2.0 * (places - a) / (b - a) - 1.0, degree)
         c = (2.0 * n[:, None] + 1.0) / (b - a) * (basis.T @ ((half * w).ravel()[:, None] * samples))
-        if self.valid is not None and self.valid(samples):
-            points = np.concatenate([leggauss(self.degree + i)[0] for i in (0, 1)])
-            if not self.valid(legendre.legvander(points, self.degree) @ c):
-                c[1:] = 0.0
-        return np.asarray(legendre.legvander(2.0 * (x - a) / (b - a) - 1.0, self.degree) @ c)
+        if valid is not None and valid(samples) and not valid(legendre.legvander(inner, degree) @ c):
+            c[1:] = 0.0
+        values[dofs] = legendre.legvander(2.0 * (x[dofs] - a) / (b - a) - 1.0, degree) @ c
+    return values
 
 
 def not_negative(values: Array) -> bool:
