@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -163,6 +164,8 @@ def job(
         folder = session.folder(output or Path("results") / loaded.name, command, loaded.inputs)
         with held_back():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
+        if report and find_spec("bokeh") is None:
+            raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")
         todo = Job(loaded, folder, session, not no_plots, report, session.hint(no_advice))
         try:
             yield todo

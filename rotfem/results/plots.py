@@ -260,8 +260,7 @@ def draw(axis: Axes, mesh: Triangulation, values: Array, still: Array | None = N
         axis.tricontour(free, values, levels=[0.0], colors="0.2", linewidths=0.8)
     else:
         colours, low, high = ("Reds", 0.0, peak) if high > 0.0 else ("Blues_r", -peak, 0.0)
-    style: Any = {"shading": "gouraud", "cmap": colours, "rasterized": True}  # as vectors it is too large
-    drawn = axis.tripcolor(mesh, values, norm=Normalize(low, high), zorder=0, **style)
+    drawn = axis.tripcolor(mesh, values, shading="gouraud", cmap=colours, norm=Normalize(low, high), zorder=0)
     axis.set(xlim=(mesh.x.min(), mesh.x.max()), ylim=(mesh.y.min(), mesh.y.max()))
     return drawn
 

@@ -1,21 +1,27 @@
-"""One HTML file of a result that needs nothing else: summary, figures, modes that move, tables, scene.
+"""One HTML file of a result that needs nothing else: summary, figures that respond, modes that move, tables, scene.
 
-Figures and tables are those of `Result.drawings` and `Result.tables`. A figure is a vector graphic, which stays sharp
-where it is enlarged.
+Figures are those of `Result.drawings`: lines, bars and ranges become figures of Bokeh (https://docs.bokeh.org), whose
+script is in the file; what is drawn in three dimensions stays a picture.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 import tomli_w
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FixedLocator
 
-from rotfem.results.columns import ShortTable, ShownUnits, per_cent
+from rotfem.results.columns import ZERO, ShownUnits, described, label, label_of
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result, data_url
@@ -23,7 +29,9 @@ from rotfem.results.result import Result, data_url
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Rows of a table, at most.
+Array = npt.NDArray[np.float64]
+
+#: Points of a line, and rows of a table, at most.
 MOST = 2000
 
 #: Largest displacement of a mode that moves, part of the length.
@@ -66,26 +74,35 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
     Raises:
         OutputError: it cannot be written.
     """
-    summary, drawn = result.summary, [draw() for draw in result.drawings().values()]
+    from bokeh.embed import components
+    from bokeh.resources import Resources
+
+    summary, figures = result.summary, {name: draw() for name, draw in result.drawings().items()}
     name, command, status = (escape(str(summary[key])) for key in ("name", "command", "status"))
-    figures = "".join(f"<h3>{escape(title_of(figure))}</h3>{picture(figure)}" for figure in drawn)
-    hint = '<p class="hint">A double click enlarges a figure, a second one shows all of it; dragging moves it.</p>'
+    live = {file: found for file, figure in figures.items() if (found := interactive(figure)) is not None}
+    scripts, places = components(live) if live else ("", {})
+    parts = "".join(
+        f"<figure><h3>{escape(_title(figure))}</h3>{places.get(file) or picture(figure)}</figure>"
+        for file, figure in figures.items()
+    )
+    hint = '<p class="hint">Drag to move, zoom with the tools on the right, click a name to hide its line.</p>'
     moving, cards = animated(result)
-    tables = [f'<div class="scroll">{table.html(MOST)}</div>' for table in result.tables() if table.rows]
     sections = [
         f'<header><h1>{name}</h1><p>rotfem {command}</p><span class="status {status}">{status}</span></header>',
         section("Summary", facts(summary) + messages(summary)),
-        section("Figures", figures and hint + figures),
+        section("Figures", (hint if live else "") + parts),
         section("Modes in motion", cards),
-        section("Tables", "".join(tables)),
+        section("Tables", "".join(table(*entry) for entry in tables(result))),
         section("How exact it is", error_table(summary)),
         section("Scene", scene(summary, drawing)),
         section("Made with", facts_list(summary["versions"]) + folded("summary.json", json_text(dict(summary)))),
     ]
     content = {
         "title": f"{name}: rotfem {command}",
+        "library": Resources(mode="inline", components=["bokeh"]).render_js() if live else "",
         "content": "\n".join(sections),
         "modes": json.dumps(moving, separators=(",", ":")),
+        "scripts": scripts,
     }
     text = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
     for key, value in content.items():
@@ -129,6 +146,68 @@ def messages(summary: Mapping[str, Any]) -> str:
     return "".join([*out, *(f'<p class="note">{escape(str(text))}</p>' for text in said)])
 
 
+def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Yield title and rows of what a summary has in lists, of figures and peaks, and of the settings of a study."""
+    summary, units = result.summary, ShownUnits.of(result.summary)
+    if summary.get("kind") is not None:
+        figures: dict[str, dict[str, Any]] = {}
+        for key, value in summary.get("figures", {}).items():
+            for ending in ("_final", "_min_time", "_max_time", "_min", "_max"):
+                if key.endswith(ending):
+                    name = key.removesuffix(ending)
+                    row = figures.setdefault(name, {"quantity": described(name)[0], "unit": described(name)[1]})
+                    row[ending[1:].replace("_time", " at t (s)")] = value
+                    break
+        yield "Largest and last values", list(figures.values())
+    if "peaks" in summary:
+        yield "Peaks", [{"output": label(name), **peak} for name, peak in summary["peaks"].items()]
+    for key, value in summary.items():
+        if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            yield key.replace("_", " ").capitalize(), units.rows(value)
+    if summary["command"] == "cost":
+        yield "Settings", list(getattr(result, "rows", ()))
+
+
+def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return a table that a click on a heading sorts; dictionaries in a row become columns of their own."""
+    flat = [dict(_flat(row)) for row in rows[:MOST]]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    if not flat:
+        return ""
+    numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
+    numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # the scale below which these are 0
+    exact = ("residual", "error_bound", "mesh_error")  # near 0 and not shown as 0
+    least = {n: 0.0 if n in exact else ZERO * max(values, default=0.0) for n, values in numbers.items()}
+    head = "".join(f"<th{_kind(flat, n)}>{escape(label_of(n))}</th>" for n in names)
+    body = ""
+    for row in flat:
+        cells = ""
+        for n in names:
+            value = row.get(n)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            small = isinstance(value, float) and abs(value) <= least[n]
+            data = f' data-value="{value!r}"' if number and np.isfinite(float(str(value))) else ""
+            cells += f"<td{_kind(flat, n)}{data}>{shown(0 if small else value)}</td>"
+        body += f"<tr>{cells}</tr>"
+    more = f"<p>the first {MOST} of {len(rows)} rows</p>" if len(rows) > MOST else ""
+    inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+    return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
+
+
+def _kind(rows: Sequence[Mapping[str, Any]], name: str) -> str:
+    return ' class="text"' if any(isinstance(row.get(name), str) for row in rows) else ""
+
+
+def _flat(row: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in row.items():
+        if key == "row":  # of a table of its own
+            continue
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
 def shown(value: Any) -> str:
     """Return a value as it is read."""
     if value is None:
@@ -146,15 +225,17 @@ def error_table(summary: Mapping[str, Any]) -> str:
     """Return the contributions to the error and what they mean; nothing where no error was estimated."""
     error = summary.get("error", {})
     rows = [
-        (name.replace("_", "-"), per_cent(error[name]), meaning) for name, meaning in MEANING.items() if name in error
+        {"contribution": name.replace("_", "-"), "relative error": error[name], "what it is": meaning}
+        for name, meaning in MEANING.items()
+        if name in error
     ]
     scale = f"<p>Relative to {error['scale']:.6g} m, the largest displacement.</p>" if error.get("scale") else ""
-    return ShortTable(("contribution", "error (%)", "what it is"), rows).html() + scale if rows else ""
+    return table("Estimated error", rows) + scale if rows else ""
 
 
 def scene(summary: Mapping[str, Any], drawing: Figure | None) -> str:
     """Return the drawing and the tables of the scene, those of defaults too."""
-    image = "" if drawing is None else picture(drawing)
+    image = "" if drawing is None else f"<figure>{picture(drawing)}</figure>"
     if "scene" not in summary:
         return image
     return image + folded("all keys of the scene", tomli_w.dumps(summary["scene"]))
@@ -168,16 +249,114 @@ def folded(title: str, text: str) -> str:
 # --- figures ----------------------------------------------------------------------------------------------------------
 
 
-def title_of(figure: Figure) -> str:
-    """Return what a figure shows, in one line."""
+def _title(figure: Figure) -> str:
     text = figure.get_suptitle() or (figure.axes[0].get_title() if len(figure.axes) == 1 else "")
     return str(text).replace("\n", "; ")
 
 
 def picture(figure: Figure) -> str:
     """Return a figure as an image in the page."""
-    image = f'<img alt="{escape(title_of(figure))}" src="{data_url(figure, 110, "svg")}" draggable="false">'
-    return f'<figure class="picture">{image}</figure>'
+    return f'<img alt="{escape(_title(figure))}" src="{data_url(figure, 110)}">'
+
+
+def interactive(figure: Figure) -> Any:
+    """Return a figure as one of Bokeh, its panels moving together; None if it is more than lines, bars and ranges."""
+    from bokeh.layouts import gridplot
+    from bokeh.models import Range1d
+
+    axes = [axis for axis in figure.axes if axis.axison]
+    if not axes or any(a.name == "3d" or a.images for a in axes):
+        return None
+    known = (Line2D, Rectangle, PolyCollection)
+    if not all(isinstance(artist, known) for a in axes for artist in (*a.lines, *a.patches, *a.collections)):
+        return None
+    x: dict[tuple[float, float], Any] = {}
+    panels = [panel(a, x.setdefault(a.get_xlim(), Range1d(*map(float, a.get_xlim())))) for a in axes]
+    options = {"sizing_mode": "stretch_width", "toolbar_location": "right", "toolbar_options": {"logo": None}}
+    return gridplot(panels, ncols=1, **options)
+
+
+def panel(axes: Any, x_range: Any) -> Any:
+    """Return one panel as a figure of Bokeh."""
+    from bokeh.models import BoxAnnotation, Legend, LegendItem, Range1d, Span
+    from bokeh.plotting import figure
+
+    tall = axes.get_position().height * axes.get_figure().get_figheight() * 100.0
+    plot = figure(
+        height=int(np.clip(tall, 170, 480)),
+        x_range=x_range,
+        y_range=Range1d(*map(float, axes.get_ylim())),
+        x_axis_type=axes.get_xscale(),
+        y_axis_type=axes.get_yscale(),
+        x_axis_label=axes.get_xlabel() or None,
+        y_axis_label=axes.get_ylabel() or None,
+        title=axes.get_title(loc="left") or None,
+        tools="pan,wheel_zoom,box_zoom,reset,hover",
+        tooltips=[("", "$name"), ("x", "$x"), ("y", "$y")],
+    )
+    dashes = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
+    named: dict[str, list[Any]] = {}
+    for line in (line for line in axes.lines if len(line.get_xydata())):
+        colour = to_hex(line.get_color())
+        dash = dashes.get(str(line.get_linestyle()), "solid")
+        if line.get_transform() != axes.transData:  # a line from one side to the other
+            across = line.get_transform() == axes.get_yaxis_transform()
+            place = float(np.asarray(line.get_ydata() if across else line.get_xdata())[0])
+            way = "width" if across else "height"
+            plot.add_layout(Span(location=place, dimension=way, line_color=colour, line_dash=dash, line_width=1))
+            continue
+        said = str(line.get_label())
+        said = _text_at(axes, line, colour) if said.startswith("_") else said
+        x, y = thinned(np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
+        drawn = []
+        if str(line.get_linestyle()) not in ("None", "none", ""):
+            drawn.append(plot.line(x, y, color=colour, line_dash=dash, line_width=line.get_linewidth(), name=said))
+        if str(line.get_marker()) not in ("None", "none", "", " "):
+            face = line.get_markerfacecolor()
+            fill = None if str(face) == "none" else to_hex(face)
+            drawn.append(plot.scatter(x, y, size=line.get_markersize(), color=colour, fill_color=fill, name=said))
+        named.setdefault(said, []).extend(drawn)
+    for bar in axes.patches:
+        (left, bottom), width, height = bar.get_xy(), bar.get_width(), bar.get_height()
+        said, colour = str(bar.get_label()).removeprefix("_nolegend_"), to_hex(bar.get_facecolor())
+        if bar.get_data_transform() != axes.transData:  # a range from one side to the other
+            across = bar.get_data_transform() == axes.get_yaxis_transform()
+            ends = {"bottom": bottom, "top": bottom + height} if across else {"left": left, "right": left + width}
+            plot.add_layout(BoxAnnotation(**ends, fill_color=colour, fill_alpha=0.3, line_color=None, level="underlay"))
+            continue
+        ends = {"left": left, "right": left + width, "bottom": bottom, "top": bottom + height}
+        named.setdefault(said, []).append(plot.quad(**ends, color=colour, name=said))
+    for area in axes.collections:
+        for path in area.get_paths():
+            colour, corners = to_hex(np.asarray(area.get_facecolor())[0].tolist()), np.asarray(path.vertices)
+            plot.patch(corners[:, 0], corners[:, 1], color=colour, alpha=0.25, line_width=0)
+    items = [LegendItem(label=said, renderers=drawn) for said, drawn in named.items() if said and drawn]
+    if items and (len(items) > 1 or len(named) > 1):
+        style = {"click_policy": "hide", "label_text_font_size": "9pt", "border_line_color": None}
+        plot.add_layout(Legend(items=items, **style), "right")
+    if isinstance(axes.yaxis.get_major_locator(), FixedLocator) and (ticks := axes.get_yticks()) is not None:
+        plot.yaxis.ticker = [float(tick) for tick in ticks]
+        labels = [text.get_text() for text in axes.get_yticklabels()]
+        plot.yaxis.major_label_overrides = {float(t): said for t, said in zip(ticks, labels, strict=True) if said}
+    plot.grid.grid_line_color = "#e6eaee"
+    plot.outline_line_color = "#c3cbd4"
+    return plot
+
+
+def _text_at(axes: Any, line: Line2D, colour: str) -> str:
+    """Return the text of a line's colour that stands nearest to its end; nothing where there is none."""
+    end = float(np.asarray(line.get_ydata(), dtype=np.float64)[-1])
+    there = [text for text in axes.texts if to_hex(text.get_color()) == colour and hasattr(text, "xy")]
+    return str(min(there, key=lambda text: abs(float(text.xy[1]) - end)).get_text()) if there else ""
+
+
+def thinned(x: Array, y: Array) -> tuple[Any, Any]:
+    """Return a line by `MOST` at most: of every stretch its lowest and highest point."""
+    if len(x) > MOST:
+        parts = np.array_split(np.arange(len(x)), MOST // 2)
+        kept = sorted({int(part[i]) for part in parts for i in (np.argmin(y[part]), np.argmax(y[part]))})
+        x, y = x[kept], y[kept]
+    return x.astype(np.float32), y.astype(np.float32)
 
 
 # --- modes ------------------------------------------------------------------------------------------------------------

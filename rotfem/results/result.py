@@ -200,10 +200,9 @@ def image(figure: Figure, dpi: int, format: str = "png") -> bytes:
     return file.getvalue()
 
 
-def data_url(figure: Figure, dpi: int, format: str = "png") -> str:
-    """Return a figure as an image inside a page, "png" or "svg"."""
-    kind = {"svg": "svg+xml"}.get(format, format)
-    return f"data:image/{kind};base64,{base64.b64encode(image(figure, dpi, format)).decode()}"
+def data_url(figure: Figure, dpi: int) -> str:
+    """Return a figure as a PNG image inside a page."""
+    return f"data:image/png;base64,{base64.b64encode(image(figure, dpi)).decode()}"
 
 
 def save(figure: Figure, path: Path) -> Path:
