@@ -222,7 +222,7 @@ def cost(
         progress=todo.progress,
     )
     todo.finish(result)
-    if result.recommended is None:
+    if result.summary["recommended"] is None:
         raise result.missed()
     if write is not None and todo.session.first:
         result.write_tuned(write)

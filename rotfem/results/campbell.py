@@ -142,34 +142,6 @@ class CampbellResult(Rows):
             out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
         return out
 
-    def travelling_waves(self) -> dict[str, dict[str, Array]]:
-        """Return label ↦ `speed`, `forward`, `backward` (rad/s) of a disk's modes with nodal diameters, fixed frame.
-
-        Of a pair of modes with m nodal diameters one travels with the spin and one against it (column `turning`). Seen
-        from the fixed frame they have ω₊ + mΩ and ω₋ − mΩ; the backward wave stands still where ω₋ = mΩ, a critical
-        speed. Where only one of a pair was computed it stands for both.
-        """
-        out: dict[str, dict[str, Array]] = {}
-        branches = self.branches()
-        for label, a in branches.items():
-            kind, _, rest = label.partition(" ")
-            number, _, way = rest.partition(" ")
-            diameters = int(number.split(".")[0]) if kind == "diameters" else 0
-            name = f"{kind} {number}"
-            if diameters == 0 or name in out:
-                continue
-            b = branches.get(f"{name} {'backward' if way == 'forward' else 'forward'}", a)
-            speed, here, there = np.intersect1d(a["speed"], b["speed"], return_indices=True)
-            first, second = ({k: c[i] for k, c in x.items()} for x, i in ((a, here), (b, there)))
-            ahead = first["turning"] >= second["turning"]
-            wave = diameters * np.abs(speed)
-            out[name] = {
-                "speed": speed,
-                "forward": np.where(ahead, first["frequency"], second["frequency"]) + wave,
-                "backward": np.where(ahead, second["frequency"], first["frequency"]) - wave,
-            }
-        return out
-
     def texts(self) -> dict[str, str]:
         """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")

@@ -143,34 +143,6 @@ def recommendations(
 # --- the result ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class CostPoint:
-    """What one setting costs, and what it gives.
-
-    Attributes:
-        setting: theory, mesh, degree, scheme and step.
-        time: of one run without its set-up, median, s.
-        cost: CPU time of one run with its set-up, s: what settings are ranked by.
-        error: relative, that of the theory included.
-        pareto: whether no other setting is as fast and as exact, and better in one.
-    """
-
-    setting: Setting
-    time: float
-    cost: float
-    error: float
-    pareto: bool
-
-    @classmethod
-    def of(cls, row: Row) -> CostPoint | None:
-        """Return the point of a row; None if its setting failed or there is nothing to judge it by."""
-        error = judged(row)
-        return cls(setting_of(row), row["time"], row["cost"], error, row["pareto"]) if error < math.inf else None
-
-    def __str__(self) -> str:
-        return f"{self.setting.words()}: error {self.error:.1e}, {self.cost:.3g} s of CPU time"
-
-
 @dataclass(repr=False)
 class CostResult(Rows):
     """Outcome of `rotfem cost`.
@@ -188,20 +160,9 @@ class CostResult(Rows):
     references: dict[str, Reference] = field(default_factory=dict, repr=False)
 
     @property
-    def points(self) -> list[CostPoint]:
-        """Time and error of every setting that could be computed and judged, in the order they were tried."""
-        return [point for point in map(CostPoint.of, self.rows) if point is not None]
-
-    @property
-    def front(self) -> list[CostPoint]:
-        """The points that no other one beats in both time and error, cheapest first."""
-        return sorted((point for point in self.points if point.pareto), key=lambda point: point.cost)
-
-    @property
-    def recommended(self) -> CostPoint | None:
-        """The cheapest setting within the accuracy that was asked for, uncertainty included; None if there is none."""
-        row = self.summary["recommended"]
-        return None if row is None else CostPoint.of(row)
+    def front(self) -> list[Row]:
+        """The rows that no other one beats in both cost and error, cheapest first."""
+        return sorted((row for row in self.rows if row["pareto"]), key=lambda row: float(row["cost"]))
 
     def recommend(self, accuracy: float) -> Row | None:
         """Return the cheapest row within a relative accuracy, uncertainty included; None if there is none."""
@@ -266,7 +227,7 @@ class CostResult(Rows):
 
     def tables(self) -> list[ShortTable]:
         """Return one row a setting, cheapest first; of many settings those of the Pareto front."""
-        rows = self.rows if len(self.rows) <= LONGEST_TABLE else [row for row in self.rows if row["pareto"]]
+        rows = self.rows if len(self.rows) <= LONGEST_TABLE else self.front
         head = ("theory", "elements", "degree", "scheme", "step (s)", "CPU (s)", "error (%)", "")
         ordered = sorted(rows, key=lambda r: (r["status"] != "done", r["cost"]))
         return [ShortTable(head, [_cells(row) for row in ordered])]
@@ -360,7 +321,7 @@ def cost_figure(result: CostResult) -> Figure:
             top, label = axis.get_xaxis_transform(), f"{theory}, failed at that time"
             axis.plot(failed, [0.98] * len(failed), "x", color=colour, transform=top, clip_on=False, label=label)
     axis.set(xscale="log", yscale="log", xlabel="CPU time of one run with its set-up, median (s)")
-    front = sorted((row for row in result.rows if row["pareto"]), key=lambda row: float(row["cost"]))
+    front = result.front
     errors = [max(judged(r), 1e-16) for r in front]
     axis.plot([r["cost"] for r in front], errors, "k-", lw=1.2, drawstyle="steps-post", zorder=0, label="Pareto front")
     for row, error in zip(front, errors, strict=True):
