@@ -185,7 +185,7 @@ class Sweep:
         most: speeds that may be solved; those asked for are in any case.
 
     Attributes:
-        known: speed ↦ modes there that other processes have solved for.
+        known: speed ↦ modes there that are solved already.
         each: (items, work) ↦ what the work makes of every item; processes may share them out.
     """
 

@@ -29,9 +29,12 @@ Array = npt.NDArray[Any]
 #: Speeds from which a basis saves time: it takes three full solutions at least.
 MANY = 3
 
+#: Entries of lifted eigenvectors that are computed together: some ten arrays of 16 MB.
+TOGETHER = 1_000_000
 
-def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> ModalAnalysis:
-    """Return the analysis in a basis where that is possible and saves time, else the analysis itself.
+
+def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> ReducedAnalysis | None:
+    """Return the analysis in a basis where that is possible and saves time, else None.
 
     It is possible of a linear theory in the rotating frame with a fixed hub.
 
@@ -44,9 +47,9 @@ def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> Mo
         ComputationError: a full solution failed.
     """
     if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
-        return analysis
+        return None
     reduced = ReducedAnalysis(analysis)
-    return reduced if reduced.prepare(speeds[0], speeds[-1], count) else analysis
+    return reduced if reduced.prepare(speeds[0], speeds[-1], count) else None
 
 
 def product(A: Array, X: Array) -> Array:
@@ -212,19 +215,30 @@ class ReducedAnalysis(ModalAnalysis):
         self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
     ) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
-        system = self.system
-        zero = system.zeros()
-        c = system.coefficients(system.motion.at_speed(speed))
-        M, C, K = (A[0] for A in self.basis.operators(c[None, :]))
-        pencil = SmallPencil(M, C, K, self._root, self._asymmetries)
-        pairs = pencil.solve(min(count, self.V.shape[1] - 1))
-        pairs.errors = self._backward_errors(pairs, c[self._index])
-        pencil.owner = self
-        out = Spinning(speed, zero, pencil, pairs, pencil)
-        X = product(self.V, pairs.right)
-        lost = self._round_off.stiffness(X if pairs.left is pairs.right else product(self.V, pairs.left), X)
-        slope = out.own.diagonal()
-        pairs.bounds = relative(lost / np.maximum(np.abs(slope * pairs.values), 1e-300)) + pairs.bounds
+        return self.at_all([speed], count)[0]
+
+    def at_all(self, speeds: Sequence[float], count: int) -> list[Spinning]:
+        """Return what `at` does at several speeds, with the errors of all pairs in one go."""
+        part = max(1, TOGETHER // (count * self.system.material.getSize()[0]))
+        if len(speeds) > part:
+            return [s for i in range(0, len(speeds), part) for s in self.at_all(speeds[i : i + part], count)]
+        zero, motion = self.system.zeros(), self.system.motion
+        c = np.array([self.system.coefficients(motion.at_speed(speed)) for speed in speeds])
+        out = []
+        for speed, M, C, K in zip(speeds, *self.basis.operators(c), strict=True):
+            pencil = SmallPencil(M, C, K, self._root, self._asymmetries)
+            pencil.owner = self
+            pairs = pencil.solve(min(count, self.V.shape[1] - 1))
+            out.append(Spinning(speed, zero, pencil, pairs, pencil))
+        numbers = [len(s.pairs.values) for s in out]
+        values, right, left = (np.hstack([getattr(s.pairs, n) for s in out]) for n in ("values", "right", "left"))
+        errors = self._backward_errors(values, right, np.repeat(c[:, self._index], numbers, axis=0).T)
+        X = product(self.V, right)
+        lost = self._round_off.stiffness(X if out[0].pencil.conservative else product(self.V, left), X)
+        slopes = np.hstack([s.own.diagonal() for s in out])
+        bounds, ends = relative(lost / np.maximum(np.abs(slopes * values), 1e-300)), np.cumsum(numbers)[:-1]
+        for s, own, bound in zip(out, np.split(errors, ends), np.split(bounds, ends), strict=True):
+            s.pairs.errors, s.pairs.bounds = own, bound + s.pairs.bounds
         return out
 
     def right(self, spinning: Spinning) -> Array:
@@ -235,16 +249,21 @@ class ReducedAnalysis(ModalAnalysis):
         """Return M times the eigenvectors."""
         return product(self.mass, spinning.pairs.right)
 
-    def _backward_errors(self, pairs: Eigenpairs, c: Array) -> Array:
-        """Return the normwise backward errors of the lifted eigenpairs in the full system, shape (m,).
+    def _backward_errors(self, values: Array, right: Array, c: Array) -> Array:
+        """Return the normwise backward errors of lifted eigenpairs in the full system, shape (m,).
 
         Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
+
+        Args:
+            values: λ, shape (m,).
+            right: vectors, a column each.
+            c: factors of the pieces of M, C and K, shape (pieces, m).
         """
         power = np.repeat([2, 1, 0], [len(self.basis.kinds[kind]) for kind in "MCK"])
-        factors = c[:, None] * pairs.values[None, :] ** power[:, None]
-        parts = (factors[:, None, :] * pairs.right[None, :, :]).reshape(-1, len(pairs.values))
+        factors = c * values ** power[:, None]
+        parts = (factors[:, None, :] * right).reshape(-1, len(values))
         residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real
-        lengths = np.sum(pairs.right.conj() * product(self._metric, pairs.right), axis=0).real
+        lengths = np.sum(right.conj() * product(self._metric, right), axis=0).real
         return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
 
 

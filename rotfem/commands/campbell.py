@@ -137,12 +137,15 @@ def diagram(
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
-    full, analysis = analysis, in_basis(analysis, values, count + SPARE)
+    reduced = in_basis(analysis, values, count + SPARE)
+    analysis = reduced or analysis
     sweep = Sweep(analysis, count, scene.limits.speeds)
     if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if analysis is full:
+        if reduced is None:
             sweep.known = solved_by_all(analysis, values, count, progress)
         sweep.each = partial(shared_out, comm=analysis.everyone)
+    if reduced is not None:
+        sweep.known = dict(zip(values, reduced.at_all(values, count + SPARE), strict=True))
     sweep.run(values, progress or (lambda share: None))
     sweep.count = count = min(count, len(sweep.nodes[0].order))
     found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
