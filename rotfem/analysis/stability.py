@@ -107,15 +107,11 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
     held.set_time(0.0, held.motion.at_speed(speed))
     held.set_state(q[: len(held.q.x.array)])
     K = held.matrix(1.0, 0.0, 0.0, 1.0)
-    negative = _negative(K)
-    if negative == 0:
+    if _negative(K) == 0:
         return Stability()
     matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
-    if system.hub is None:
-        return by_motions(Pencil(*matrices), negative)
-    # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
-    pencil = Pencil(*system.with_hub(matrices))
-    return by_motions(pencil, None, Pencil(*matrices).scale())
+    clamped = Pencil(*matrices)
+    return stability_of_pencil(clamped if system.hub is None else Pencil(*system.with_hub(matrices)), clamped)
 
 
 def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
@@ -129,7 +125,10 @@ def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
     negative = _negative(clamped.K) if negative is None else negative
     if negative == 0:
         return Stability()
-    return by_motions(pencil, negative) if pencil is clamped else by_motions(pencil, None, clamped.scale())
+    if pencil is clamped:
+        return by_motions(pencil, negative)
+    # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
+    return by_motions(pencil, None, clamped.scale())
 
 
 def _negative(K: Any) -> int | None:

@@ -137,10 +137,6 @@ class EnergyBalance(Solutions):
         q[dofs], v[dofs] = (start + end) / 2, (end - start) / h
         a[dofs] = (v[dofs] - self._v_0[dofs]) * 2 / h
 
-    def set_time(self, t: float, motion: Any = None, load_factor: float = 1.0) -> None:
-        """Write the frame and load constants of time t (see `System.set_time`)."""
-        self.system.set_time(t, motion, load_factor)
-
     def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
         """Write the middle of the step, and with it its end, into what the forms are evaluated at."""
         assert v is not None
@@ -207,7 +203,3 @@ class EnergyBalance(Solutions):
         self.A.assemble()
         self.A.axpy(self._factor, self._N, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return self.system.with_modes(self.A, c_v), True
-
-    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
-        """Return c_k K + c_v C + c_m M of the system."""
-        return self.system.matrix(c_k, c_v, c_m, diagonal)

@@ -165,31 +165,6 @@ class Piece:
         self.of, self.at_root = self.of | other.of, self.at_root + other.at_root
 
 
-class PolynomialCheck:
-    """Compares a term at constants of no special size with what its pieces make of them.
-
-    The pieces are found with constants that are 0, 1 and −1, which determine a polynomial of second degree by its
-    values; c|v|v has values there too, but is none.
-    """
-
-    def __init__(self, pieces: Pieces, kind: str, name: str):
-        self._values = {entry: 1.7 + 0.3 * i for i, entry in enumerate(pieces.entries_of(name))}
-        self._left = pieces.assemble_at(kind, self._values)
-        self._same = () if kind == "f" else (SAME,)
-        self._size = self._left.norm()
-
-    def subtract(self, key: Key, operator: Any) -> None:
-        """Take off the part of a piece, all bodies in it."""
-        factor = float(np.prod([self._values[entry] for entry in key]))
-        self._size += abs(factor) * operator.norm()
-        self._left.axpy(-factor, operator, *self._same)
-
-    @property
-    def failed(self) -> bool:
-        """Whether something is left, or not finite: the term is no polynomial of second degree."""
-        return not self._left.norm() <= 1e-10 * self._size  # round-off of sums of some hundred numbers
-
-
 class Pieces:
     """All pieces of a model, assembled.
 
@@ -336,23 +311,35 @@ class Pieces:
             apart = self._apart or name == INTERNAL.name  # strains are wanted without what an effect adds to them
             for part in [(p,) for p in parts] if apart else [parts]:
                 self._set_switches((name, *part))
-                check = self._is_checked(name) and PolynomialCheck(self, kind, name)
-                for key in self._keys(name):
-                    self._set_switches((name, *part))
-                    operator = self._polarised(kind, key, declared=self.model.acting[name].constants is not None)
-                    if check:
-                        check.subtract(key, operator)
+                declared = self.model.acting[name].constants is not None
+                whole = {key: self._polarised(kind, key, declared) for key in self._keys(name)}
+                if self._is_checked(name) and not self._is_made_up(kind, name, whole):
+                    self.not_polynomial.append(name)
+                for key, operator in whole.items():
                     if "" in part:
                         bodiless[key] = operator
                     elif key in bodiless:
                         operator.axpy(-1.0, bodiless[key], *same)
                     if operator.norm() > 0.0:
                         found.append((key, operator, frozenset((name, *part))))
-                if check and check.failed and name not in self.not_polynomial:
-                    self.not_polynomial.append(name)
         for key, operator, of in found:
             self._keep(kind, key, operator, of)
         self.assembled += perf_counter() - started
+
+    def _is_made_up(self, kind: str, name: str, parts: Mapping[Key, Any]) -> bool:
+        """Return whether a term at constants of no special size is what these parts of it make there.
+
+        They are found with constants that are 0, 1 and −1, which determine a polynomial of second degree by its values;
+        c|v|v has values there too, but is none.
+        """
+        values = {entry: 1.7 + 0.3 * i for i, entry in enumerate(self.entries_of(name))}
+        left, same = self.assemble_at(kind, values), () if kind == "f" else (SAME,)
+        size = left.norm()
+        for key, operator in parts.items():
+            factor = float(np.prod([values[entry] for entry in key]))
+            size += abs(factor) * operator.norm()
+            left.axpy(-factor, operator, *same)
+        return bool(left.norm() <= 1e-10 * size)  # round-off of sums of some hundred numbers
 
     def _keep(self, kind: str, key: Key, operator: Any, of: frozenset[str]) -> None:
         """Add a piece: what it does at the clamp apart, clamped rows and columns zero, or 1 in those of the strains."""

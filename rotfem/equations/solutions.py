@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
@@ -18,55 +18,30 @@ Array = npt.NDArray[Any]
 
 
 class Solutions:
-    """Solutions with the tangent and the mass matrix of a system, which it gives.
+    """Solutions with the matrices of equations that have `residual`, `tangent` and `matrix` (see `System`).
 
     Attributes:
-        seconds: time spent on assembly and on solution.
         factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, and `shifts`, `before`, `reference` of
             its tangent.
         factored_before: factorisations of the same computation before this object was made.
     """
 
+    residual: Callable[[], Any]
+    tangent: Callable[..., tuple[Any, bool]]
+    matrix: Callable[..., Any]
+    set_state: Callable[..., None]
+    set_time: Callable[..., None]
+    count_rotations_from: Callable[[Any], None]
     seconds: dict[str, float]
-    factored: dict[str, Any] | None = None
-    factored_before = 0
     keeps_factor: bool
     model: Any
+    reference: Any
+    factored: dict[str, Any] | None = None
+    factored_before = 0
     _state: tuple[Array, ...]
-    _solver: DirectSolver | None
     _dx: Increment
+    _solver: DirectSolver | None
     _mass: tuple[Any, tuple[DirectSolver | SingularSolver, Array]] | None = None
-
-    @abstractmethod
-    def residual(self) -> Any:
-        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
-
-    @abstractmethod
-    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
-        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows.
-
-        With the q from which a correction has led to the state it may be another one that leads on better.
-        """
-
-    @abstractmethod
-    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
-        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-
-    @abstractmethod
-    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
-        """Write the state that the forms are evaluated at."""
-
-    @abstractmethod
-    def set_time(self, t: float) -> None:
-        """Write what the forms depend on at time t (s)."""
-
-    def count_rotations_from(self, reference: Any) -> None:
-        """Count rotations from a reference, where there can be another one than the undeformed structure, None."""
-
-    @property
-    def reference(self) -> Any:
-        """What rotations are counted from; None for the undeformed structure."""
-        return None
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""

@@ -157,7 +157,22 @@ class System(Solutions, ABC):
         if self.structure.turns is not None:
             self.structure.turns.check(q, time)
 
-    # --- what kinds of systems differ in, besides `Solutions` --------------------------------------------------------
+    # --- what kinds of systems differ in -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+
+    @abstractmethod
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows.
+
+        With the q from which a correction has led to the state it may be another one that leads on better.
+        """
+
+    @abstractmethod
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
 
     @abstractmethod
     def _compile(self) -> Any:
