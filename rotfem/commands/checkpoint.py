@@ -47,13 +47,14 @@ Tree = dict[str, Any]
 
 #: Parts of a checkpoint, and the types they may have.
 PARTS: dict[str, Any] = {
-    **dict.fromkeys(("identity", "versions", "state", "stepper", "log", "monitor", "every"), dict),
+    **dict.fromkeys(("identity", "versions", "state", "stepper", "log", "monitor"), dict),
     **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "settings"), (dict, NoneType)),
     "positions": (np.ndarray, dict),
     "rows": np.ndarray,
     **dict.fromkeys(("t", "elapsed"), float),
     "given": (np.ndarray, NoneType),
     "factorisations": int,
+    "every": (float, int),
     **dict.fromkeys(("columns", "companions"), list),
 }
 
@@ -125,8 +126,7 @@ def check_parts(tree: Tree) -> None:
     if wrong:
         raise ValueError(", ".join(sorted(map(str, wrong))))
     json.dumps([tree["identity"], tree["versions"]["rotfem"]])
-    every = [tree["every"][name] for name in ("seconds", "steps") if tree["every"][name] is not None]
-    if len(every) != 1 or not every[0] > 0.0:
+    if isinstance(tree["every"], bool) or not tree["every"] > 0:
         raise ValueError("every")
     if (settings := tree["settings"]) is not None:
         known = {name: settings[name] for name in ("elements", "scheme")}

@@ -28,9 +28,9 @@ def run(
 ) -> None:
     """Compute the steady state or the time history of SCENE."""
     from rotfem.commands.run import simulate
-    from rotfem.commands.run_store import Interval, RunStore
+    from rotfem.commands.run_store import RunStore, interval
 
-    every = None if checkpoint is None else Interval.of(checkpoint)
+    every = None if checkpoint is None else interval(checkpoint)
     store = RunStore(todo.session.comm, todo.results, every, resume)
     if resume and (summary := store.finished(todo.scene)):
         todo.session.print_json(summary)

@@ -34,7 +34,7 @@ from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Recorder, reduced_history
-from rotfem.commands.run_store import Interval, RunStore
+from rotfem.commands.run_store import RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
@@ -352,7 +352,7 @@ def run(
         OutputError: the folder cannot be written.
     """
     scene = as_scene(scene)
-    every = None if checkpoint is None else Interval.of(checkpoint)
+    every = None if checkpoint is None else interval(checkpoint)
     if folder is None:
         return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs)
     with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:

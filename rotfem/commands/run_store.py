@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from time import monotonic
 from typing import Any
 
@@ -25,30 +24,17 @@ from rotfem.scene import Scene
 TALK = 0.05
 
 
-@dataclass(frozen=True)
-class Interval:
-    """Time, or number of steps, from one checkpoint to the next.
+def interval(text: str | int) -> float | int:
+    """Return the time (s, a float) from one checkpoint to the next of "30s", or the number of steps of "500".
 
-    Attributes:
-        seconds: of the clock on the wall; None where steps are counted.
-        steps: number of steps; None where time is.
+    Raises:
+        SceneError: it is none.
     """
-
-    seconds: float | None = None
-    steps: int | None = None
-
-    @classmethod
-    def of(cls, text: str | int) -> Interval:
-        """Return the interval of "30s" or "500".
-
-        Raises:
-            SceneError: it is none.
-        """
-        found = re.fullmatch(r"(\d+(?:\.\d+)?)(s?)", str(text))
-        if found is None or float(found[1]) == 0.0 or not (found[2] or found[1].isdigit()):
-            allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'
-            raise SceneError("command line", "--checkpoint", text, allowed)
-        return cls(seconds=float(found[1])) if found[2] else cls(steps=int(found[1]))
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)(s?)", str(text))
+    if found is None or float(found[1]) == 0.0 or not (found[2] or found[1].isdigit()):
+        allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'
+        raise SceneError("command line", "--checkpoint", text, allowed)
+    return float(found[1]) if found[2] else int(found[1])
 
 
 class RunStore:
@@ -57,7 +43,7 @@ class RunStore:
     Args:
         comm: communicator of the run.
         folder: where its results go; None keeps nothing.
-        every: from one checkpoint to the next; None writes none.
+        every: from one checkpoint to the next, see `interval`; None writes none.
         resume: whether the run goes on from the checkpoint in the folder.
     """
 
@@ -65,7 +51,7 @@ class RunStore:
         self,
         comm: MPI.Comm,
         folder: ResultFolder | None = None,
-        every: Interval | None = None,
+        every: float | int | None = None,
         resume: bool = False,
     ):
         self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
@@ -114,7 +100,7 @@ class RunStore:
 
         if self.resume:
             self._tree = self.folder.first_does(read)
-            self.every = self.every or Interval(**self._tree["every"])
+            self.every = self.every or self._tree["every"]
 
     def finished(self, scene: Scene) -> Tree | None:
         """Return the summary in the folder if it is that of this run, done; None otherwise."""
@@ -181,12 +167,12 @@ class RunStore:
 
         Ranks talk to each other after so many steps only as take about `TALK` on rank 0: they need not meet in between.
         """
-        asked, every = self._interrupts.asked, self.every or Interval()
+        asked, every = self._interrupts.asked, self.every
         steps = 0 if self._run is None else self._run.log.steps
-        due = every.steps is not None and steps > 0 and steps % every.steps == 0
+        due = isinstance(every, int) and steps > 0 and steps % every == 0
         if self.comm.size > 1 and steps < self._next:
             return False, due
-        late = every.seconds is not None and steps > 0 and monotonic() - self._written >= every.seconds
+        late = isinstance(every, float) and steps > 0 and monotonic() - self._written >= every
         if self.comm.size > 1:
             now = monotonic()
             pace, self._talked = (now - self._talked[0]) / max(1, steps - self._talked[1]), (now, steps)
@@ -205,7 +191,7 @@ class RunStore:
         """Write a checkpoint."""
         if self.folder is None or self._run is None or self.every is None:
             return
-        tree = self._run.taken(state, self._identity) | {"every": vars(self.every)}
+        tree = self._run.taken(state, self._identity) | {"every": self.every}
         if self.folder.set is not None:
             try:
                 write_checkpoint(self.folder.path / CHECKPOINT, tree)

@@ -32,7 +32,7 @@ from rotfem.commands.job import app
 from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
 from rotfem.listeners import Progress
-from rotfem.results.result_set import FolderLock, ResultSet, holder, read_summary
+from rotfem.results.result_set import ResultSet, holder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
 from rotfem.scene import load_scene
 from rotfem.scene.extensions import load, loaded
@@ -98,21 +98,15 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
 
 def settle(point: Point, scene: Path, verb: Sequence[str]) -> bool:
     """Compute a point unless that is done; return whether it is, and no other process is at it."""
-    if point.settled:
-        return True
+    if point.settled or holder(point.folder):
+        return point.settled
     point.folder.mkdir(parents=True, exist_ok=True)
-    lock = FolderLock(point.folder)
     try:
-        lock.acquire()
+        _compute(point, scene, verb)
     except OutputError:
-        if holder(point.folder):
+        if holder(point.folder):  # which was quicker
             return False
-        lock.acquire()
-    try:
-        if not point.settled:
-            _compute(point, scene, verb)
-    finally:
-        lock.release()
+        raise
     return True
 
 

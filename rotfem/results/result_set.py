@@ -54,68 +54,49 @@ Writer = Callable[[Path], Any]
 #: Name of the file that is locked, while it is; it says who holds the lock.
 NAME = ".rotfem.lock"
 
-#: Folders that this process has locked ↦ descriptor, and how often.
-_locks: dict[str, tuple[int, int]] = {}
-
 
 class FolderLock:
-    """Lock on a result folder that is there. A process may hold it several times over; another one is refused.
+    """Lock on a result folder that is there, from now on until it is released; a second one is refused.
 
     What a killed process leaves of it is a file that no process holds, and no obstacle.
     """
 
     def __init__(self, folder: Path):
-        self.folder, self._key, self._mine = folder, os.path.realpath(folder), False
-
-    def acquire(self) -> None:
-        """Take the lock."""
-        if self._mine:
-            return
-        descriptor, times = _locks.get(self._key, (-1, 0))
-        if times == 0:
-            try:
-                descriptor = self._locked()
-            except OSError as error:
-                if error.errno == errno.ELOOP:
-                    raise OutputError(self.folder / NAME, "it is a symbolic link, which is not followed") from None
-                raise OutputError(self.folder, error.strerror or str(error)) from None
-        _locks[self._key] = (descriptor, times + 1)
-        self._mine = True
+        self._path = Path(os.path.realpath(folder), NAME)
+        self._descriptor: int | None = None
+        try:
+            while self._descriptor is None:
+                self._descriptor = self._locked(folder)
+        except OSError as error:
+            if error.errno == errno.ELOOP:
+                raise OutputError(folder / NAME, "it is a symbolic link, which is not followed") from None
+            raise OutputError(folder, error.strerror or str(error)) from None
 
     def release(self) -> None:
-        """Give the lock back, and remove its file with the last hold on it."""
-        if not self._mine:
-            return
-        self._mine = False
-        descriptor, times = _locks.pop(self._key)
-        if times > 1:
-            _locks[self._key] = (descriptor, times - 1)
-            return
-        Path(self._key, NAME).unlink(missing_ok=True)
-        os.close(descriptor)
+        """Give the lock back, and remove its file."""
+        if self._descriptor is not None:
+            self._path.unlink(missing_ok=True)
+            os.close(self._descriptor)
+            self._descriptor = None
 
-    def _locked(self) -> int:
-        """Return the descriptor of the file, locked."""
-        path = Path(self._key, NAME)
-        while True:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                owner = _named_in(descriptor)
-                os.close(descriptor)
-                raise OutputError(self.folder, f"{owner} is writing its results there") from None
-            except OSError:  # a file system without locks: whoever shares it must take care
-                return descriptor
-            try:
-                ours = os.path.samestat(os.stat(path), os.fstat(descriptor))
-            except FileNotFoundError:
-                ours = False
-            if ours:
+    def _locked(self, folder: Path) -> int | None:
+        """Return the descriptor of the file, locked; None where whoever held it has removed it in between."""
+        descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = _named_in(descriptor)
+            os.close(descriptor)
+            raise OutputError(folder, f"{owner} is writing its results there") from None
+        except OSError:  # a file system without locks: whoever shares it must take care
+            return descriptor
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.stat(self._path), os.fstat(descriptor)):
                 os.ftruncate(descriptor, 0)
                 os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
                 return descriptor
-            os.close(descriptor)  # whoever held it has removed the file in between
+        os.close(descriptor)
+        return None
 
 
 def holder(folder: Path) -> str:
@@ -177,7 +158,6 @@ class ResultSet(AbstractContextManager["ResultSet"]):
         left = is_ours(there) and there["status"] in AT_WORK and not holder(folder)
         self.before = said_of(folder) if left else ""
         self._lock = FolderLock(folder)
-        self._lock.acquire()
         taken = self._taken(inputs)
         if taken is not None:
             self._lock.release()

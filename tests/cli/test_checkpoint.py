@@ -24,7 +24,7 @@ import pytest
 import rotfem
 from rotfem import SceneError
 from rotfem.commands.run import Simulation
-from rotfem.commands.run_store import Interval
+from rotfem.commands.run_store import interval
 from rotfem.results import checkpoint_file
 from rotfem.results.files import read_csv
 from rotfem.scene import as_scene
@@ -291,11 +291,13 @@ def test_what_cannot_be_resumed_is_said(folder: Path, rotfem: Any) -> None:
 
 
 def test_intervals() -> None:
-    assert Interval.of("30s") == Interval(seconds=30.0)
-    assert Interval.of("0.5s") == Interval(seconds=0.5)
-    assert Interval.of("500") == Interval.of(500) == Interval(steps=500)
+    seconds = interval("30s"), interval("0.5s")
+    assert seconds == (30.0, 0.5)
+    assert all(isinstance(value, float) for value in seconds)
+    assert interval("500") == interval(500) == 500
+    assert isinstance(interval("500"), int)
     with pytest.raises(SceneError, match="--checkpoint"):
-        Interval.of("soon")
+        interval("soon")
 
 
 def test_a_checkpoint_that_cannot_be_written_is_no_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -264,7 +264,7 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 from rotfem.results.result_set import FolderLock
-FolderLock(Path(sys.argv[1])).acquire()
+lock = FolderLock(Path(sys.argv[1]))
 print("locked", flush=True)
 time.sleep(60)
 """
@@ -290,13 +290,12 @@ def test_another_process_is_refused_until_the_first_has_ended_or_was_killed(tmp_
     assert NAME not in files(tmp_path)
 
 
-def test_one_process_may_hold_a_lock_several_times_over(tmp_path: Path) -> None:
-    outer, inner = FolderLock(tmp_path), FolderLock(tmp_path)
-    outer.acquire()
-    inner.acquire()
-    inner.release()
-    assert NAME in files(tmp_path)
-    outer.release()
+def test_a_lock_is_held_until_it_is_released(tmp_path: Path) -> None:
+    lock = FolderLock(tmp_path)
+    with pytest.raises(OutputError, match="is writing its results there"):
+        FolderLock(tmp_path)
+    lock.release()
+    lock.release()
     assert files(tmp_path) == set()
 
 
