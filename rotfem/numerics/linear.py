@@ -161,7 +161,8 @@ class DirectSolver:
         By AMD, which is found in a quarter of the time of the ordering of METIS and fills in by a fifth more. Without
         supernodes CHOLMOD would make L D Lᵀ, which indefinite matrices have too.
         """
-        chosen, options = {"nmethods": 1, "factor": "SUPERNODAL"}, PETSc.Options("mat_cholmod_")
+        # Its own warning of a matrix that is not definite would go to standard output, where summaries are.
+        chosen, options = {"nmethods": 1, "factor": "SUPERNODAL", "print": 0}, PETSc.Options("mat_cholmod_")
         for name, value in chosen.items():
             options[name] = value
         try:

@@ -231,3 +231,18 @@ def test_what_a_singular_matrix_does_not_feel_follows_the_other() -> None:
     SingularSolver(A, K).solve(b, x)
     # A x = b and 2 x₁ + 3 x₂ = 0; to what K is beside A
     np.testing.assert_allclose(x.array, [0.6, -0.4], rtol=1e-7)
+
+
+def test_an_indefinite_matrix_is_factorised_without_a_word(capfd: pytest.CaptureFixture[str]) -> None:
+    """CHOLMOD, which is tried first, has a warning of its own for standard output, where summaries are."""
+    n = 40
+    A = PETSc.Mat().createAIJ((n, n), nnz=3, comm=PETSc.COMM_SELF)
+    for i in range(n):
+        A[i, i] = 4.0 if i % 7 else -4.0
+        if i:
+            A[i, i - 1] = A[i - 1, i] = 1.0
+    A.assemble()
+    solver = DirectSolver(A, symmetric=True, counting=True)
+    solver.factorise()
+    assert solver.negative == 6
+    assert capfd.readouterr() == ("", "")
