@@ -29,7 +29,7 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.settings import estimates_error, usual
+from rotfem.scene.settings import estimates_error
 from rotfem.units import si
 from rotfem.users_functions import number_of
 
@@ -113,11 +113,13 @@ class Problem(ProblemData):
                 with.
             ComputationError: a step failed, however short.
         """
-        end, step = si(end, "s", "time.end"), None if step is None else si(step, "s", "time.step")
-        scheme = scheme or Scheme.registry[usual({"tolerance": tolerance})]()
-        check_steps(end, step, tolerance, scheme)
+        given = {"end": end, "step": step, "tolerance": tolerance}
+        time = Time(**{name: value for name, value in given.items() if value is not None})
+        scheme = scheme or scheme_of(time)
+        if tolerance is not None and not estimates_error(type(scheme)):
+            raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
         system = self.system(comm=comm)
-        march = March(system, scheme, Steps(end, step, tolerance), Newton(), first_shape(system, start))
+        march = March(system, scheme, Steps.of(time), Newton(), first_shape(system, start))
         return (Moment(system, state) for state in march)
 
     def steady(self, *, speed: float | str | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:
@@ -168,21 +170,6 @@ class Problem(ProblemData):
 
     def _speed(self, speed: float | str | None) -> float:
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")
-
-
-def check_steps(end: float, step: float | None, tolerance: float | None, scheme: Scheme) -> None:
-    """Refuse steps that are none.
-
-    Raises:
-        InputError: says which and why.
-    """
-    if (step is None) == (tolerance is None):
-        raise InputError("time.step", step, "give step, or tolerance for adaptive steps, not both")
-    for name, value in (("end", end), ("step", step), ("tolerance", tolerance)):
-        if value is not None and not value > 0.0:
-            raise InputError(f"time.{name}", value, "must be greater than 0")
-    if tolerance is not None and not estimates_error(type(scheme)):
-        raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
 
 
 def first_motion(scene: Scene) -> FirstMotion | None:
