@@ -174,10 +174,12 @@ def test_locking_degrees_are_refused() -> None:
 def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Path) -> None:
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes" / "speed.csv").write_text("0, 0\n10, 3\n30, 6\n")
+    (tmp_path / "scenes" / "push").write_text("0, 0, 0\n10, 3, 1\n")
     text = (
         '[structure]\ntype = "planar_beam"\nlength = 10.0\nhub_radius = 0.5\n'
         "[structure.section]\nEA = 2.8e7\nGA = 1.0e7\nEI = 1.4e4\nmass_per_length = 1.2\nrotary_inertia = 6e-4\n"
         '[motion]\ntype = "table"\ntable = "speed.csv"\n[time]\nend = 20.0\nstep = 0.004\noutput_every = 5\n'
+        '[[loads.at]]\nx = 5.0\nforce = "push"\n'
     )
     (tmp_path / "scenes" / "beam.toml").write_text(text)
     scene = load_scene(tmp_path / "scenes" / "beam.toml", ["structure.tip_mass=0.25"])
@@ -186,6 +188,7 @@ def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Path) -> None:
     tuned = load_scene(write_tuned(scene, setting, tmp_path / "out" / "tuned.toml", "# two\n# lines\n\n"))
     assert tuned.motion == scene.motion
     assert tuned.structure == scene.structure
+    assert tuned.loads == scene.loads
     assert (tuned.model.theory, tuned.mesh.elements, tuned.mesh.degree) == ("second_order", 5, 2)
     assert tuned.time is not None
     assert (tuned.time.scheme, tuned.time.parameters.get("spectral_radius")) == ("newmark", None)

@@ -20,7 +20,6 @@ from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.files import json_text, rows_text, write_text
 from rotfem.results.result import Array, Row, Rows, Variables, column_of_rows
 from rotfem.scene import Scene
-from rotfem.scene.span_tables import is_path
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,12 +32,6 @@ ERRORS = {
     "tip": "error of the tip's motion, relative to its largest displacement (–)",
     "frequencies": "largest relative error of a frequency (–)",
     "campbell": "largest relative error of a frequency at any speed (–)",
-}
-
-#: Keys whose value, where it is a string, is the path of a file, whatever it ends with.
-FILE_KEYS = {
-    *("table", "base_acceleration", "tip_force", "tip_moment", "distributed", "distributed_moment"),
-    *("mesh", "from", "file"),
 }
 
 
@@ -272,25 +265,23 @@ def write_tuned(scene: Scene, setting: Setting, path: Path, remark: str) -> Path
         SceneError: the combination is not valid, or the scene holds a Python function, which no file can.
         OutputError: the file cannot be written.
     """
-    tables = scene.replace(changes_of(scene, setting)).tables
+    there, start, goal = scene.replace(changes_of(scene, setting)), Path(scene.directory), path.parent.resolve()
+    files = set(map(os.path.realpath, there.inputs))
+
+    def moved(value: Any) -> Any:
+        """Return tables with the paths of files that the scene reads made relative to the folder of the new one."""
+        if isinstance(value, Mapping):
+            return {key: moved(entry) for key, entry in value.items()}
+        if isinstance(value, list):
+            return [moved(entry) for entry in value]
+        is_file = isinstance(value, str | Path) and "\0" not in str(value) and os.path.realpath(start / value) in files
+        return os.path.relpath(start.resolve() / value, goal) if is_file and not Path(value).is_absolute() else value
+
     try:
-        text = tomli_w.dumps(_moved(tables, Path(scene.directory).resolve(), path.parent.resolve()))
+        text = tomli_w.dumps(moved(there.tables))
     except TypeError:
         raise SceneError(scene.file, allowed="holds a Python function, so that it cannot be written as TOML") from None
     return write_text(path, remark + text)
-
-
-def _moved(tables: Mapping[str, Any], start: Path, goal: Path) -> dict[str, Any]:
-    """Return tables with the relative paths of start made relative to goal."""
-    out: dict[str, Any] = {}
-    for key, value in tables.items():
-        if isinstance(value, Mapping):
-            out[key] = _moved(value, start, goal)
-        elif isinstance(value, str | Path) and (key in FILE_KEYS or is_path(value)) and not Path(value).is_absolute():
-            out[key] = os.path.relpath(start / value, goal) if start != goal else str(value)
-        else:
-            out[key] = value
-    return out
 
 
 # --- the figure ------------------------------------------------------------------------------------------------------
