@@ -47,29 +47,28 @@ def load_of(key: str, given: Any, structure: Any, motion: Motion | None = None, 
     """
     planar = structure.is_planar
     size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
-    if (place := getattr(given, "place_function", None)) is not None:
-        timed = given.over_span_and_time is not None
-        function = checked(place, key, size, "place and time" if timed else "place", planar)
+    over, value = given.over
+    if "x" in over and callable(value):
+        timed = "t" in over
+        function = checked(value, key, size, "place and time" if timed else "place", planar)
         at = function if timed else (lambda x, t: function(x))
         # Places along the structure, of a plate from a file one, that show how the load changes with time.
         probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
         places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
         return PlaceLoad(kind, at, places, constant=not timed)
     terms = [_harmonic(harmonic, motion) for harmonic in getattr(given, "harmonic", ())]
-    if given.value is not None:
-        terms.append(Term(Shapes.uniform([given.value])))
-    elif given.time_function is not None:
-        of_time = checked(given.time_function, key, size, "time", planar)
+    if callable(value):
+        of_time = checked(value, key, size, "time", planar)
         each = Shapes.uniform(np.eye(size))
         terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
-    elif (rows := given.time_table) is not None:
-        terms.append(Term.table(rows, Shapes.uniform(np.eye(len(rows[0]) - 1))))
-    elif getattr(given, "over_span", None) is not None:
-        terms.append(Term(Shapes.along_span(given.over_span)))
-    elif getattr(given, "over_span_and_time", None) is not None:
-        terms.append(Term.both(given.over_span_and_time))
-    elif getattr(given, "regions", None) is not None:
-        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in given.regions.items()]
+    elif over == ("t",):
+        terms.append(Term.table(value, Shapes.uniform(np.eye(len(value[0]) - 1))))
+    elif over:
+        terms.append(Term(Shapes.along_span(value)) if over == ("x",) else Term.both(value))
+    elif isinstance(value, dict):
+        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in value.items()]
+    elif value is not None:
+        terms.append(Term(Shapes.uniform([value])))
     return Load(kind, tuple(terms))
 
 

@@ -261,16 +261,14 @@ def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
         cells = _cells(line)
         if not cells:
             continue
-        values = [_number(cell) for cell in cells]
+        values = [number_in(cell) for cell in cells]
         if not top:
             width, top = len(cells), number
             if any(cells) and all(value is None for value in values):
                 continue
         for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
             if value is None or not math.isfinite(value):
-                short = len(cell) <= SHOWN_CELL and cell.isprintable()
-                what = f'"{cell}"' if short else f"a text of {len(cell)} characters"
-                reason = f"line {number}, column {column}: {what} must be a finite number"
+                reason = f"line {number}, column {column}: {shown_cell(cell)} must be a finite number"
                 raise problem("", str(path), f"{reason} (only the first row may be a header, one without any number)")
         if len(cells) != width:
             raise problem("", str(path), f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
@@ -283,7 +281,7 @@ def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
 def read_header(text: str) -> list[str]:
     """Return the cells of the first row, if none of them is a number; else nothing."""
     first = next((cells for line in text.split("\n") if (cells := _cells(line))), [])
-    return first if all(_number(cell) is None for cell in first) else []
+    return first if all(number_in(cell) is None for cell in first) else []
 
 
 def _cells(line: str) -> list[str]:
@@ -292,7 +290,12 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in content.split(",")] if content else []
 
 
-def _number(cell: str) -> float | None:
+def shown_cell(cell: str) -> str:
+    """Return a cell as a message shows it."""
+    return f'"{cell}"' if len(cell) <= SHOWN_CELL and cell.isprintable() else f"a text of {len(cell)} characters"
+
+
+def number_in(cell: str) -> float | None:
     """Return the number in a cell, None if there is none."""
     if not cell.isascii() or "_" in cell:  # which Python takes for digits and between them
         return None

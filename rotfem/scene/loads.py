@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -14,7 +14,7 @@ from rotfem.scene.motion import Motion
 from rotfem.scene.signals import FORCE, MOMENT, PRESSURE, Harmonic, Kind, Signal, arguments
 from rotfem.scene.span_tables import is_path
 from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, as_number, as_vector
+from rotfem.scene.values import ROUND_OFF, Number, PaddedVector, as_number, as_vector
 
 
 class Load(Signal):
@@ -52,31 +52,19 @@ class Load(Signal):
         return cls._kind(info).vector(value)
 
     @property
-    def time_table(self) -> Matrix | None:
-        """Its rows over time, None where there are none."""
-        return self.table if self.table is not None else self.over_time if isinstance(self.over_time, tuple) else None
-
-    @property
-    def time_function(self) -> Callable[[float], Any] | None:
-        """The function of time that it is, None where it is none."""
-        return self.over_time if callable(self.over_time) else self.function
-
-    @property
-    def place_function(self) -> Callable[..., Any] | None:
-        """The function of place, or of place and time, that it is, None where it is none."""
-        return None
-
-    @property
     def span_rows(self) -> Iterator[tuple[float, ...]]:
-        """All rows (x, components) of tables over the span."""
-        yield from ()
+        """All rows (x, components) of tables over the span, and over span and time."""
+        over, given = self.over
+        if "x" in over and isinstance(given, tuple):
+            yield from ((row[0], *row[len(over) :]) for row in given)
+        yield from (row for h in self.harmonic if isinstance(h.amplitude[0], tuple) for row in h.amplitude)
 
     @property
     def vectors(self) -> Iterator[tuple[float, ...]]:
         """All vectors that are known of it: of the value, of tables and of harmonics."""
         yield from super().vectors
-        yield from (row[1:] for row in self.span_rows)
-        yield from (h.amplitude for h in self.harmonic if not isinstance(h.amplitude[0], tuple))
+        for h in self.harmonic:
+            yield from (row[1:] for row in h.amplitude) if isinstance(h.amplitude[0], tuple) else (h.amplitude,)
 
 
 class MomentLoad(Load):
@@ -112,20 +100,6 @@ class SpanLoad(Load):
         kind = cls._kind(info)
         return kind.rows(("x",), value, info) if rows or is_path(value) else kind.vector(value)
 
-    @property
-    def place_function(self) -> Callable[..., Any] | None:
-        """The function of place, or of place and time, that it is, None where it is none."""
-        given = self.over_span if self.over_span is not None else self.over_span_and_time
-        return given if callable(given) else None
-
-    @property
-    def span_rows(self) -> Iterator[tuple[float, ...]]:
-        """All rows (x, components) of tables over the span, and over span and time."""
-        tables = (self.over_span, *(h.amplitude for h in self.harmonic if isinstance(h.amplitude[0], tuple)))
-        yield from (row for table in tables if isinstance(table, tuple) for row in table)
-        both = self.over_span_and_time
-        yield from ((row[0], *row[2:]) for row in (both if isinstance(both, tuple) else ()))
-
     @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
         """Take a function of two arguments for one of place and time."""
@@ -136,7 +110,8 @@ class SpanLoad(Load):
 
     def _check(self) -> None:
         super()._check()
-        if self.place_function is not None and self.harmonic:
+        over, given = self.over
+        if "x" in over and callable(given) and self.harmonic:
             raise problem("harmonic", None, "cannot stand beside a function of the place, which can do the same")
 
 

@@ -222,17 +222,14 @@ class Signal(Given):
         return cls.VECTORS
 
     @property
-    def time_table(self) -> Matrix | None:
-        """Its rows over time, None where there are none."""
-        return self.table
-
-    @property
-    def time_function(self) -> Callable[[float], Any] | None:
-        """The function of time that it is, None where it is none."""
-        return self.function
+    def over(self) -> tuple[tuple[str, ...], Any]:
+        """What it is over, ("t",), ("x",) or ("x", "t"), () of one value, and that, or rows or a function; or None."""
+        name = next(iter(self.given), "value")
+        return {"function": ("t",), **OVER}.get(name, ()), getattr(self, name)
 
     @property
     def vectors(self) -> Iterator[tuple[float, ...]]:
-        """The value, or the rows without their times; none of a function."""
-        yield from () if self.value is None else (self.value,)
-        yield from (row[1:] for row in self.time_table or ())
+        """The value, or the rows without what they are over; none of a function."""
+        over, given = self.over
+        if isinstance(given, tuple):
+            yield from (row[len(over) :] for row in (given if over else [given]))

@@ -10,7 +10,9 @@ import pytest
 import yaml
 
 import rotfem
-from rotfem.scene import Scene
+from rotfem.commands.cost.result import write_tuned
+from rotfem.commands.cost.settings import own_setting
+from rotfem.scene import Scene, load_scene
 from rotfem.scene.blades.windio import MOST_YAML
 from tests import blade_decks as decks
 from tests import blade_main_decks as mains
@@ -284,12 +286,18 @@ def test_a_format_is_not_guessed(tmp_path: Path) -> None:
 
 
 def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
-    from rotfem.commands.cost.result import _moved
-
-    structure = {"line": "line.csv", "section": {"from": "blade", "EA": "EA.csv", "shape": "circle", "GJ": 1.0}}
-    found = _moved({"structure": structure}, tmp_path, tmp_path / "deeper")["structure"]
-    assert found["line"] == "../line.csv"
-    assert found["section"] == {"from": "../blade", "EA": "../EA.csv", "shape": "circle", "GJ": 1.0}
+    """A file without an ending, too; what is no file stays."""
+    (tmp_path / "blade").write_text(decks.elastodyn())
+    (tmp_path / "EA.csv").write_text(f"0, 1e12\n{decks.LENGTH}, 1e12\n")
+    (tmp_path / "deeper").mkdir()
+    section = {"from": "blade", **RIGID, "EA": "EA.csv"}
+    beam = {"type": "spatial_beam", "length": decks.LENGTH, "section": section}
+    tables = {"structure": beam, "motion": {"type": "constant", "speed": 0.0}}
+    scene = Scene.from_dict(tables, directory=tmp_path)
+    tuned = load_scene(write_tuned(scene, own_setting(scene, "frequencies"), tmp_path / "deeper" / "tuned.toml", ""))
+    found = tuned.tables["structure"]
+    assert found == {**beam, "section": {**section, "from": "../blade", "EA": "../EA.csv"}}
+    assert tuned.structure == scene.structure
 
 
 def test_windio_2(tmp_path: Path) -> None:

@@ -79,10 +79,10 @@ def test_a_bare_table_is_over_time_in_a_history_and_refused_without_one() -> Non
 
 
 def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
-    assert scene({"distributed": lambda t: (0, t)}).loads.distributed.place_function is None  # type: ignore[union-attr]
+    assert scene({"distributed": lambda t: (0, t)}).loads.distributed.over[0] == ("t",)  # type: ignore[union-attr]
     both = scene({"distributed": lambda x, t: (0, x * t)}).loads.distributed
     assert both is not None
-    assert both.place_function is not None
+    assert both.over[0] == ("x", "t")
 
 
 def test_tables_from_files(tmp_path: Any) -> None:

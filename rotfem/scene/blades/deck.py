@@ -15,7 +15,7 @@ import numpy as np
 from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
-from rotfem.scene.files import LARGEST, SHOWN_CELL, Unreadable, read_bytes
+from rotfem.scene.files import LARGEST, Unreadable, number_in, read_bytes, shown_cell
 from rotfem.scene.table import Unit, as_name, problem, problems_at
 from rotfem.scene.values import DIGITS, Array
 
@@ -115,20 +115,14 @@ class Deck:
         """Return the whole number of the line `value  name …`, at least so many."""
         line, text = self.named(name)
         if not text.isdecimal() or int(text) < least:
-            self.fail(f'{name} is "{text[:SHOWN_CELL]}"; must be a whole number, at least {least}', line, 1)
+            self.fail(f"{name} is {shown_cell(text)}; must be a whole number, at least {least}", line, 1)
         return int(text)
 
     def value(self, text: str, line: int, column: int) -> float:
         """Return a word as a finite number; exponents may have Fortran's D."""
-        try:
-            number = float(re.sub(r"[dD]", "e", text)) if text.isascii() and "_" not in text else math.nan
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            shown = (
-                f'"{text}"' if len(text) <= SHOWN_CELL and text.isprintable() else f"a text of {len(text)} characters"
-            )
-            self.fail(f"{shown} must be a finite number", line, column)
+        number = number_in(re.sub(r"[dD]", "e", text))
+        if number is None or not math.isfinite(number):
+            self.fail(f"{shown_cell(text)} must be a finite number", line, column)
         return number
 
     def row(self, line: int, columns: int) -> list[float]:
