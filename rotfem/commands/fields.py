@@ -1,4 +1,4 @@
-"""Fields over a structure: its properties along the span, and what is written for ParaView, in VTX or XDMF.
+"""Fields over a structure: its properties along the span, and what is written for ParaView, in XDMF.
 
 That is the moving structure, its modes, section forces and stress resultants.
 """
@@ -20,7 +20,6 @@ from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import HALF_WIDTH, Surface
 from rotfem.scene.values import evaluate
-from rotfem.structures.paraview import MOST, writer
 
 Array = npt.NDArray[np.float64]
 #: Names, and values (nodes, names) at times.
@@ -28,41 +27,62 @@ Named = tuple[tuple[str, ...], list[tuple[float, Array]]]
 Writer = Callable[[Path], list[Path]]
 
 
-def fields_writer(
-    system: Any, states: list[tuple[float, Array]], formats: tuple[str, ...], more: Named | None = None
-) -> Writer | None:
-    """Return what writes the fields of a run into a folder, on all ranks together; None of no format.
+#: Most snapshots of a history that are kept.
+MOST = 200
 
-    States are (time in s, local dof array); formats "vtx" (fields.bp) and "xdmf" (fields.xdmf with fields.h5), which
-    has more named fields at the same times.
+
+class Snapshots:
+    """States of a history at ever wider intervals, so that there are never more than MOST."""
+
+    def __init__(self) -> None:
+        self.kept: list[tuple[float, Array]] = []
+        self._every, self._count = 1, 0
+
+    def add(self, t: float, q: Array) -> None:
+        """Keep a copy of the local dof array q at time t (s), or pass it by."""
+        if self._count % self._every == 0:
+            self.kept.append((t, q.copy()))
+            if len(self.kept) > MOST:
+                self.kept, self._every = self.kept[::2], 2 * self._every
+        self._count += 1
+
+    def put_back(self, known: dict[str, Any], count: int) -> None:
+        """Take all attributes that there were after so many states.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        kept, every = known["kept"], known["_every"]
+        due = count if every == 1 else 1 + (count - 1) // every
+        if known["_count"] != count or len(kept) != due or not 0 < len(kept) <= MOST or set(known) != set(vars(self)):
+            raise ValueError(f"{len(kept)} snapshots after {count} states")
+        self.kept, self._every, self._count = [(float(t), np.asarray(x)) for t, x in kept], every, count
+
+
+def fields_writer(system: Any, states: list[tuple[float, Array]], more: Named | None = None) -> Writer:
+    """Return what writes fields.xdmf and fields.h5 of a run into a folder, on all ranks together.
+
+    States are (time in s, local dof array); `more` has further fields at the same times.
     """
-    writers: list[Writer] = []
-    if "vtx" in formats:
-        pitch = system.motion.pitch
-        seen = states if pitch is None else [(t, pitch.in_hub_axes(q, t)) for t, q in states]
-        writers.append(writer(system.structure, "fields", seen))
-    if "xdmf" in formats:
-        writers.append(lambda folder: _write(system, states, folder / "fields.xdmf", more))
-    return (lambda folder: [path for write in writers for path in write(folder)]) if writers else None
-
-
-def _write(system: Any, states: list[tuple[float, Array]], path: Path, more: Named | None) -> list[Path]:
-    """Gather the displacements, and write them on rank 0."""
     structure = system.structure
 
     def displacement(t: float, q: Array) -> Array:  # in the turning frame
         coordinates, values = structure.nodes(q[: len(system.held.zeros())])
         return moved(structure, system.held.seen_from_hub(values, coordinates["x"], t))
 
-    frames = [(t, {"displacement": displacement(t, q)}) for t, q in states]
-    if more is not None:
-        names, further = more
-        for (_, fields), (_, values) in zip(frames, further, strict=True):
-            fields.update(zip(names, values.T, strict=True))
-    points = structure.places(structure.nodes(system.held.zeros())[0])
-    surface = structure.surface()
-    cells = chain(len(points)) if surface is None else surface
-    return write_xdmf(path, points, cells, frames) if system.comm.rank == 0 else []
+    def write(folder: Path) -> list[Path]:
+        """Gather the displacements, and write them on rank 0."""
+        frames = [(t, {"displacement": displacement(t, q)}) for t, q in states]
+        if more is not None:
+            names, further = more
+            for (_, fields), (_, values) in zip(frames, further, strict=True):
+                fields.update(zip(names, values.T, strict=True))
+        points = structure.places(structure.nodes(system.held.zeros())[0])
+        surface = structure.surface()
+        cells = chain(len(points)) if surface is None else surface
+        return write_xdmf(folder / "fields.xdmf", points, cells, frames) if system.comm.rank == 0 else []
+
+    return write
 
 
 def moved(structure: Any, values: Array) -> Array:
@@ -191,22 +211,16 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
     return Surface.of_beam(points, (halves[0] * axes[0], halves[1] * axes[1]), structure.length)
 
 
-def modes_writer(analysis: Any, result: ModesResult, scaled: Array, formats: tuple[str, ...]) -> Writer:
-    """Return what writes "xdmf" (the surface) and "vtx" (the mesh) of modes; the time is the number of the mode.
-
-    `scaled` are the shapes as vectors of the owned unknowns, (n, modes).
-    """
+def modes_writer(analysis: Any, result: ModesResult) -> Writer:
+    """Return what writes the surface of modes as modes.xdmf; the time is the number of the mode."""
     surface, shapes = result.surface, result.shapes
     assert surface is not None
-    first = 1 + len(result.rows) - len(shapes)
-    vtx = writer(analysis.structure, "modes", [(float(first + i), x) for i, x in enumerate(scaled.T)])
 
     def write(folder: Path) -> list[Path]:
-        paths: list[Path] = vtx(folder) if "vtx" in formats else []
-        if "xdmf" in formats and analysis.comm.rank == 0:
-            frames = surface.frames(shapes, first)
-            paths = [*paths, *write_xdmf(folder / "modes.xdmf", surface.points, surface.triangles, frames)]
-        return paths
+        if analysis.comm.rank != 0:
+            return []
+        frames = surface.frames(shapes, 1 + len(result.rows) - len(shapes))
+        return write_xdmf(folder / "modes.xdmf", surface.points, surface.triangles, frames)
 
     return write
 

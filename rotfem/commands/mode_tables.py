@@ -57,7 +57,7 @@ def mode_tables(
     out = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
     if shapes and formats is not None:
         out.surface = surface_of(structure, next(iter(shapes.values())))
-        out.fields = modes_writer(analysis, out, scaled, formats)
+        out.fields = modes_writer(analysis, out) if formats else None
     return out
 
 

@@ -15,7 +15,7 @@ from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_respons
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed_within
 from rotfem.commands.accuracy import ROWS
-from rotfem.commands.fields import fields_writer, stations_writer
+from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
 from rotfem.commands.moment import hub_values
 from rotfem.commands.monitor import Log, Monitor, check_finite
 from rotfem.equations.stations import PlateResultants, Stations
@@ -23,7 +23,6 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.results.run import RunResult, StationHistory, Table
 from rotfem.scene import Scene
 from rotfem.scene.settings import OutputTable
-from rotfem.structures.paraview import Snapshots
 
 #: What the equivalent stress is called.
 STRESS = "von_mises"
@@ -169,8 +168,7 @@ class Recorder:
         pitch = () if system.motion.pitch is None else ("pitch",)
         columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
         self._last: State | None = None
-        self.formats = output.fields
-        self.snapshots = Snapshots() if self.formats else None
+        self.snapshots = Snapshots() if output.fields else None
         self.stations = None if output.stations is None else StationRows(system, output)
         of_stations = () if self.stations is None else ("x", *self.stations.names)
         taken = (*columns, *stress, *of_stations, *named)
@@ -238,7 +236,7 @@ class Recorder:
                 out.further.append(stations_writer(self.system, out.stations))
         if self.snapshots is not None and self.snapshots.kept:
             more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
-            out.fields = fields_writer(self.system, self.snapshots.kept, self.formats, more)
+            out.fields = fields_writer(self.system, self.snapshots.kept, more)
         if self.resultants is not None:
             out.resultants = self.resultants.columns()
         return out

@@ -374,7 +374,10 @@ def _as_stations(value: Any) -> int | tuple[float, ...]:
     return places
 
 
-_FIELDS = ("vtx", "xdmf")
+def _as_fields(value: Any) -> tuple[str, ...]:
+    """Return ("xdmf",), or nothing where that is wanted; "vtx", a format of earlier versions, stands for it too."""
+    return ("xdmf",) if as_names(value, ("xdmf", "vtx"), "a format") else ()
+
 
 #: Units in which speeds and frequencies can be printed and drawn.
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
@@ -390,7 +393,7 @@ class OutputTable(SceneModel):
             from end to end.
         every: rows of history.csv from one record of the stations to the next.
         format: of the file that they go to.
-        fields: formats of the files for ParaView, "vtx" and "xdmf".
+        fields: format of the files for ParaView, "xdmf"; none where it is empty.
         error: whether the error of what is computed is estimated.
         speed: unit in which speeds are printed and drawn; that of motion.speed if not given.
         frequency: unit in which frequencies of modes are printed and drawn.
@@ -400,7 +403,7 @@ class OutputTable(SceneModel):
     stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations), Unit("m")] = None
     every: Count = 1
     format: Literal["csv", "hdf5"] = "csv"
-    fields: Annotated[tuple[str, ...], PlainValidator(lambda value: as_names(value, _FIELDS, "a format"))] = ("xdmf",)
+    fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
     error: bool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"

@@ -141,7 +141,7 @@ def tables_of(row: Row, folder: Path) -> Tables:
         tables["time"] = {"end": END, "tolerance": TOLERANCE}
     elif row["time"] != "steady":
         tables["time"] = {"end": END, "step": END / STEPS, "scheme": row["time"]}
-    output: Tables = {"plain": {}, "fields": {"fields": ["xdmf", "vtx"]}, "error off": {"error": False}}
+    output: Tables = {"plain": {}, "fields": {"fields": ["xdmf"]}, "error off": {"error": False}}
     output["stations"] = {"quantities": ["n11", "von_mises"]} if plate else {"stations": 4}
     if output[row["output"]]:
         tables["output"] = output[row["output"]]
