@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from mpi4py import MPI
 
 from rotfem.equations.model import Model
 from rotfem.numerics import forms
+from rotfem.numerics.forms import added
 from rotfem.structures.structure import Array
 
 
@@ -36,36 +38,17 @@ class RigidBody(NamedTuple):
 
 
 def rigid_body(model: Model) -> RigidBody:
-    """Return the rigid body that the structure of a model is at rest, with all mass that its effects bring.
+    """Return the rigid body that the structure of a model is at rest, with all mass that its effects bring."""
+    bodies = model.mechanics.bodies
+    places = [b for b in bodies if b.is_position]
 
-    All integrals are one form whose factors are constants: it is compiled once.
-    """
-    structure = model.structure
-    factors = [structure.constant(value) for value in (0.0, np.zeros(3), np.zeros((3, 3)))]
-    one, linear, square = factors
-
-    def density(body: Any) -> Any:
-        inner = ufl.dot(body.x, ufl.dot(square, body.x))
-        return body.density * (one + ufl.dot(linear, body.x) + inner if body.is_position else inner) * body.measure
-
-    form = forms.form(sum(density(body) for body in model.mechanics.bodies), once=True)
-
-    def total() -> float:
-        value = float(model.comm.allreduce(fem.assemble_scalar(form)))
-        for factor in factors:
-            factor.value[...] = 0.0
-        return value
-
-    one.value = 1.0
-    mass = total()
-    first, second = np.zeros(3), np.zeros((3, 3))
-    for i in range(3):
-        linear.value[i] = 1.0
-        first[i] = total()
-        for j in range(i, 3):
-            square.value[i, j] = 1.0
-            second[i, j] = second[j, i] = total()
-    return RigidBody(mass, first, second)
+    parts = {"m": added(b.density * b.measure for b in places)}
+    parts |= {f"{i}": added(b.density * b.x[i] * b.measure for b in places) for i in range(3)}
+    pairs = list(combinations_with_replacement(range(3), 2))
+    parts |= {f"{i}{j}": added(b.density * b.x[i] * b.x[j] * b.measure for b in bodies) for i, j in pairs}
+    found = Functionals(parts, model.structure.mesh)()
+    second = np.array([[found[f"{min(i, j)}{max(i, j)}"] for j in range(3)] for i in range(3)])
+    return RigidBody(found["m"], np.array([found[f"{i}"] for i in range(3)]), second)
 
 
 class Functionals:

@@ -20,6 +20,7 @@ from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, weighted
+from rotfem.numerics.linear import set_diagonal
 
 Array = npt.NDArray[np.float64]
 
@@ -297,9 +298,7 @@ class NonlinearSystem(System):
         if wanted[0] in self._parts:
             fem_petsc.assemble_matrix(A, self._parts[wanted[0]], self.bcs, 0.0)
         A.assemble()
-        d = A.getDiagonal()
-        d.array[self.clamped] = diagonal
-        A.setDiagonal(d)
+        set_diagonal(self.clamped, A, diagonal)
 
     @cached_property
     def _by_spin(self) -> BySpin:
