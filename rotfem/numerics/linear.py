@@ -158,8 +158,8 @@ class DirectSolver:
     def _factorise_definite(self) -> bool:
         """Make Cholesky's factor by CHOLMOD, in a third of MUMPS's time; return whether there is one, as A is definite.
 
-        By AMD, which is found in a quarter of the time of the ordering of METIS and fills in by a fifth more. Without
-        supernodes CHOLMOD would make L D Lᵀ, which indefinite matrices have too.
+        Its ordering is AMD alone: that of METIS takes four times as long, and two factors with it are not quicker by as
+        much. Without supernodes CHOLMOD would make L D Lᵀ, which indefinite matrices have too.
         """
         # Its own warning of a matrix that is not definite would go to standard output, where summaries are.
         chosen, options = {"nmethods": 1, "factor": "SUPERNODAL", "print": 0}, PETSc.Options("mat_cholmod_")

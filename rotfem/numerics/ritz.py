@@ -40,7 +40,7 @@ MORE = 4
 
 #: Backward error at which a pair is done; relative error of a vector at which a gyroscopic one is: that of its
 #: eigenvalue is of second order in it.
-DONE, CLOSE = 1e-13, 1e-6
+DONE, CLOSE = 1e-13, 1e-5
 
 #: Relative distance of real eigenvalues that are one.
 EQUAL = 1e-9
@@ -103,7 +103,6 @@ def gyroscopic_pairs(
         W = np.hstack([near.real[:, : count + 1], near.imag[:, : count + 1], W])
     Q: Array = np.zeros((len(d), 0))
     projected: list[Array] = [np.zeros((0, 0)) for _ in matrices]
-    before = np.inf
     for _ in range(12):
         W = new_directions(comm, Q, W / d)
         for i, (A, sign) in enumerate(zip(matrices, (1.0, -1.0, 1.0), strict=True)):
@@ -126,16 +125,15 @@ def gyroscopic_pairs(
         lengths, change = (_squares(comm, Y, 1 / scale) for Y in (X, W))
         lengths = np.bincount(pair, lengths)
         errors = np.sqrt(np.bincount(pair, change) / lengths)
-        worst = float(np.max(errors[:count]))
-        if worst < CLOSE or 0.5 * before < worst < 1e-5:  # round-off may leave that
-            chosen, imaginary = np.flatnonzero(errors <= max(CLOSE, worst)), len(values) + np.cumsum(swings) - 1
+        if np.all(errors[:count] < CLOSE):
+            chosen, imaginary = np.flatnonzero(errors < CLOSE), len(values) + np.cumsum(swings) - 1
             X -= W  # a step of inverse iteration
             left = np.bincount(pair, _squares(comm, _summed(matrices, turns, X), scale))  # of the residual
             x, swings = X[:, chosen] + 1j * swings[chosen] * X[:, imaginary[chosen]], swings[chosen]
             values, backward = values[chosen], (np.sqrt(left / lengths) / (norms @ np.abs(powers)))[chosen]
             conjugates = values[swings].conj(), x[:, swings].conj(), backward[swings]
             return np.append(values, conjugates[0]), np.hstack([x, conjugates[1]]), np.append(backward, conjugates[2])
-        before, W = worst, W.T[change > CLOSE**2 * lengths[pair]].T
+        W = W.T[change > (CLOSE / 2) ** 2 * lengths[pair]].T
     raise ComputationError("the eigensolver did not converge", advice="fewer modes.count or another mesh")
 
 
