@@ -2,10 +2,10 @@
 
     ./with-fenicsx python3 benchmarks/peers/work_precision.py [-o FOLDER] [--repetitions 3]
 
-A beam of 10 m spins up to 6 rad/s about a vertical axis; at t = 0 it begins to fall from the horizontal (`spatial` in
-the programs' scripts). Its section is the same in all directions, so that it does not twist: Exudyn's cubic cable
-elements suffice. Errors are the largest distance of the tip from the reference at every half second, by the largest
-displacement. The reference is rotfem's finest answer; the least error of Exudyn's curve says how far they agree.
+A beam of 10 m that its weight bends by 1 m spins up to 6 rad/s about a vertical axis (`spatial` in the programs'
+scripts). Its section is the same in all directions, so that it does not twist: Exudyn's cubic cable elements suffice.
+Errors are the largest distance of the tip from the reference at every half second, by the largest displacement. The
+reference is rotfem's finest answer; the least error of Exudyn's curve says how far they agree. Times are CPU times.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ import numpy as np
 from run import install, once
 
 END = 20.0
-REFERENCE = {"elements": 4, "degree": 6, "steps": 4000, "scheme": "radau5"}
+REFERENCE = {"elements": 4, "degree": 6, "steps": 800, "scheme": "radau5"}
 
 #: Program ↦ what is computed: curves from coarse to fine, mesh and steps refined together.
 SETTINGS: dict[str, list[dict[str, Any]]] = {
     "rotfem": [
         {"elements": elements, "degree": degree, "steps": steps, "scheme": scheme}
         for elements, degree, steps, scheme in (
-            (2, 4, 400, "esdirk4"),
-            (2, 5, 800, "esdirk4"),
-            (3, 5, 1600, "esdirk4"),
-            (3, 6, 3200, "esdirk4"),
-            (2, 4, 200, "radau5"),
-            (2, 5, 400, "radau5"),
-            (3, 5, 800, "radau5"),
-            (3, 6, 1600, "radau5"),
+            (2, 4, 100, "esdirk4"),
+            (2, 4, 200, "esdirk4"),
+            (2, 5, 400, "esdirk4"),
+            (3, 5, 800, "esdirk4"),
+            (2, 4, 50, "radau5"),
+            (2, 4, 100, "radau5"),
+            (2, 5, 200, "radau5"),
+            (3, 5, 400, "radau5"),
         )
     ],
     "exudyn": [
         {"elements": elements, "steps": steps, "tolerance": tolerance}
         for elements, steps, tolerance in (
-            (4, 1000, 1e-5),
+            (5, 2000, 1e-6),
             (6, 2000, 1e-6),
-            (8, 4000, 1e-6),
-            (8, 8000, 1e-7),
-            (12, 16000, 1e-8),
-            (16, 32000, 1e-8),
+            (8, 4000, 1e-7),
+            (12, 8000, 1e-8),
+            (16, 16000, 1e-8),
+            (24, 32000, 1e-8),
         )
     ],
 }

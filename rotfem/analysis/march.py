@@ -14,6 +14,7 @@ import numpy as np
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.stepper import Stepper, seen
 from rotfem.analysis.time_grid import SHORT, Leg, TimeGrid
+from rotfem.equations.modal_damping import EFFECT
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
 from rotfem.numerics import compat
@@ -221,7 +222,8 @@ class AdaptiveSteps:
                 wanted, most = leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK), 1.0
                 if wanted < self.shortest:
                     what = f"the step fell below {self.shortest:.3g} s without meeting the tolerance"
-                    advice = "a looser time.tolerance, a smaller time.min_step, or some damping"
+                    helps = ["a looser time.tolerance", "a smaller time.min_step", "some damping"]
+                    advice = ", or ".join(helps[: 2 if EFFECT in stepper.system.model.effects else 3])
                     raise ComputationError(what, time=state.t, advice=advice)
                 continue
             ratio = max(ratio / SAFETY**order, 1e-12)

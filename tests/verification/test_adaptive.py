@@ -140,3 +140,13 @@ def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> 
         run({**scene, "time": {"end": 1.0, "tolerance": 1e-3}, "output": {"error": False}})
     assert "time.step" in caught.value.advice
     assert caught.value.time is not None
+
+
+@pytest.mark.parametrize("damping", [{}, {"kelvin_voigt": 1e4}], ids=str)
+def test_advice_where_steps_are_too_short(damping: dict[str, float]) -> None:
+    """Damping is no advice for what has it."""
+    tables = {"structure": STRUCTURE | {"damping": damping}, "motion": STILL, "initial": {"state": "undeformed"}}
+    time = {"end": 10.0, "tolerance": 1e-6, "min_step": 0.1}
+    with pytest.raises(rotfem.ComputationError, match="smaller time.min_step") as caught:
+        run({**tables, "loads": {"tip_force": [0.0, 50.0]}, "time": time})
+    assert ("some damping" in str(caught.value)) == (not damping)
