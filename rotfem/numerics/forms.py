@@ -93,11 +93,10 @@ class Assembler:
         if self._own is None:
             return
         block, neighbours = self._block, np.diff(self._rows) // self._block
-        coupled, starts = np.eye(block, dtype=bool), np.append(0, np.cumsum(neighbours)[:-1])
-        for form in several:
-            there = self._assembled(form).reshape(-1, block) != 0.0
-            coupled |= np.any(np.logical_or.reduceat(there, starts).reshape(-1, block, block), axis=0)
-        coupled |= coupled.T
+        starts = np.append(0, np.cumsum(neighbours)[:-1])
+        there = self._assembled(*several).reshape(-1, block) != 0.0
+        coupled = np.any(np.logical_or.reduceat(there, starts).reshape(-1, block, block), axis=0)
+        coupled |= coupled.T | np.eye(block, dtype=bool)
         if coupled.all():
             return
         component = np.arange(len(neighbours)) % block
@@ -106,10 +105,11 @@ class Assembler:
         self._columns = self._columns[self._kept]
         self.pattern = self._with(np.zeros(len(self._columns)))
 
-    def _assembled(self, form: Any) -> npt.NDArray[np.float64]:
-        """Return the entries of a compiled form in the whole pattern; they are overwritten by the next one."""
+    def _assembled(self, *several: Any) -> npt.NDArray[np.float64]:
+        """Return the entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
         self._own.set_value(0.0)
-        fem.assemble_matrix(self._own, form)
+        for form in several:
+            fem.assemble_matrix(self._own, form)
         return np.asarray(self._own.data)
 
     def _with(self, entries: npt.NDArray[np.float64]) -> Any:

@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 
 
 def check_memory(key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm) -> None:
-    """Refuse a mesh whose matrices cannot be held.
+    """Refuse a mesh whose matrices cannot be held, whatever is computed with them.
 
     Args:
         key: what asks for so many elements.
@@ -45,16 +45,16 @@ def check_memory(key: str, value: object, nodes: float, components: int, dimensi
     unknowns = float(nodes) * components
     if unknowns < 1e5:  # nothing is asked of the system for what fits anywhere
         return
-    # Bytes per unknown, component and dimension of the mesh: a linear history of a plate took 13.6 kB per unknown,
-    # modes of 10⁵ to 10⁶ unknowns 11 kB, and planar beams of 4·10⁴ elements less than this (degrees 1 and 3: 3 kB).
-    # Modes of plates on two processes together took 29 kB per unknown.
-    needed = 1400 * (2.2 if comm.size > 1 else 1.0) * components * dimension * unknowns
+    # Bytes per unknown, component and dimension of the mesh, of what takes least, so that nothing is refused that fits:
+    # modes of plates of 10⁵ to 10⁶ unknowns took 6.7 to 8 kB per unknown, on two processes together 29 to 32 kB;
+    # planar beams of 4·10⁴ elements 3 kB (degrees 1 and 3). Histories and diagrams take more (docs/scaling.md).
+    needed = 670 * (4.3 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
         raise InputError(
             key,
             value,
-            f"makes {unknowns:.3g} unknowns, which need about {needed / 1e9:.3g} GB; there are {there / 1e9:.3g} GB: "
+            f"makes {unknowns:.3g} unknowns, which need {needed / 1e9:.3g} GB or more; there are {there / 1e9:.3g} GB: "
             f"take fewer elements or more machines, or set ROTFEM_MEMORY in the environment to the GB that may be used",
         )
 
