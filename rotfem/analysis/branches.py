@@ -310,14 +310,18 @@ class Sweep:
         i, b, k = place
         left, right = self.nodes[i : i + 2]
         before, self.solves = self.solves, 0
+        met = list[bool]()  # whether the frequency is on the line to its error bound; twice, then round-off is followed
 
         def f(speed: float) -> float:
             try:
-                return self._gap(self.between(left, speed), b, k)
+                node = self.between(left, speed)
             except ComputationError:
                 if k is None:
                     return 0.0  # K is singular: this is the speed
                 raise
+            gap, pairs, j = self._gap(node, b, k), node.spinning.pairs, node.order[b]
+            met.append(k is not None and abs(gap) <= pairs.bounds[j] * abs(pairs.values[j]))
+            return 0.0 if sum(met) == 2 else gap
 
         ends = [self._gap(node, b, k) for node in (left, right)]
         speed = right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)

@@ -271,3 +271,15 @@ def test_lines_and_speeds_of_operation_that_are_asked_for(unit_beam: Any, tmp_pa
     for wrong in ({"orders": [0]}, {"rated": -1.0}, {"operating": (2.0, 1.0)}, {"operating": ("1 rpm",)}):
         with pytest.raises(SceneError, match=f"modes.{next(iter(wrong))}"):
             campbell(scene, "0:6:3", **wrong)
+
+
+def test_critical_speeds_are_not_searched_below_round_off(unit_beam: Any) -> None:
+    """Of a beam so slender that round-off leaves six digits a search takes four solutions, and stops within them."""
+    tables = {"structure.section": slender(1e-6), "model.theory": "reissner", "modes.count": 2}
+    found = campbell(unit_beam(tables, mesh=MESH), [0.5, 1.0, 1.5, 2.0, 3.0], orders=4).summary
+    crossings = found["critical_speeds"]
+    assert len(crossings) == 3
+    assert found["speeds_solved"] <= 5 + 4 * len(crossings)
+    for crossing in crossings:
+        at = modes(unit_beam(tables | {"motion.speed": crossing["speed"]}, mesh=MESH)).rows[0]
+        assert at["frequency"] == pytest.approx(crossing["frequency"], rel=4 * at["error_bound"])
