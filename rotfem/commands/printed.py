@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rotfem.refinement.estimate import error_line, percent
+from rotfem.refinement.refine import Setting
 from rotfem.results import Result
 from rotfem.results.columns import ShownUnits
 
@@ -116,17 +117,10 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
     wanted = summary.get("accuracy")
     if wanted is None:
         return []
-    chosen, tries = wanted["chosen"], len(wanted["attempts"])
-    model = f"{chosen['theory']} theory" + (", reduced model" if chosen.get("reduced") else "")
-    number = chosen.get("elements")
-    number = "×".join(map(str, number)) if isinstance(number, list | tuple) else number
-    mesh = "the mesh of the file" if number is None else f"{number} elements"
-    steps = f", {chosen['scheme']} to {chosen['tolerance']:.2g}" if "tolerance" in chosen else ""
-    steps = f", {chosen['scheme']} with steps of {chosen['step']:.3g} s" if "step" in chosen else steps
     met = "met" if wanted["met"] else "not met"
+    tries = len(wanted["attempts"])
     attempts = "" if tries == 1 else f" after {tries} attempts"
-    found = f"{model}, {mesh} of degree {chosen['degree']}{steps}"
-    return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {found}"]
+    return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {Setting.of(wanted['chosen']).words()}"]
 
 
 def choice_report(summary: dict[str, Any]) -> list[str]:

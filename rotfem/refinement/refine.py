@@ -103,6 +103,13 @@ class Setting:
         used = {**self.models[0], **{key: value for key, value in asdict(self).items() if key not in unused}}
         return {key: value for key, value in used.items() if value is not None}
 
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Self:
+        """Return the setting of a row or a summary that has its parts by name, with no other model than that."""
+        model = {name: row[name] for name in ("theory", "reduced") if row.get(name)}
+        elements = tuple(row["elements"]) if isinstance(row.get("elements"), list) else row.get("elements")
+        return cls((model,), elements, row["degree"], row.get("scheme"), row.get("tolerance"), row.get("step"))
+
     def key(self) -> str:
         """Return what identifies the setting: all of it as JSON."""
         return json.dumps(asdict(self), sort_keys=True)

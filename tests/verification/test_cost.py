@@ -14,7 +14,7 @@ import pytest
 import rotfem
 from rotfem.commands.accuracy import changes_of
 from rotfem.commands.cost.bench import Bench, Measurement
-from rotfem.commands.cost.result import CostResult, setting_of
+from rotfem.commands.cost.result import CostResult
 from rotfem.refinement.distance import distance, largest
 from rotfem.refinement.refine import Setting
 
@@ -69,7 +69,7 @@ def test_error_of_a_point_is_its_true_error(spin_up: CostResult) -> None:
     r = spin_up.references["reissner"]
     scale = largest(r.values)
     for row in (row for row in grid_of(spin_up) if row["theory"] == "reissner"):
-        history = rotfem.run(scene.replace(changes_of(scene, setting_of(row)))).history
+        history = rotfem.run(scene.replace(changes_of(scene, Setting.of(row)))).history
         mine = at(times, np.column_stack([history["tip_u1"], history["tip_u2"]]))
         true, claimed = (largest(mine - x) / scale for x in (tip, at(times, r.values)))
         assert abs(true - claimed) <= 1.01 * r.uncertainty < 0.1 * true
@@ -177,8 +177,8 @@ def test_second_start_computes_only_what_is_new(
     assert again.rows == first.rows
     more = study(folder, steps=[0.08, 0.04, 0.02])
     assert more.summary["measured"] == 2
-    before = {setting_of(row).key(): row["time"] for row in first.rows}
-    after = {setting_of(row).key(): row["time"] for row in more.rows}
+    before = {Setting.of(row).key(): row["time"] for row in first.rows}
+    after = {Setting.of(row).key(): row["time"] for row in more.rows}
     assert all(after[setting] == time for setting, time in before.items())
     monkeypatch.setattr("rotfem.commands.cost.bench.__version__", "0.0.0")
     assert study(folder, steps=[0.04], elements=[2]).summary["resumed"] == 0

@@ -83,13 +83,6 @@ def bound(row: Row, uncertainty: float) -> float:
     return error if error == uncertainty else error + uncertainty
 
 
-def setting_of(row: Row) -> Setting:
-    """Return the setting of a row."""
-    elements = tuple(row["elements"]) if isinstance(row["elements"], list) else row["elements"]
-    others = {name: row[name] for name in ("degree", "scheme", "tolerance", "step")}
-    return Setting(({"theory": row["theory"]},), elements, **others)
-
-
 def mesh_name(row: Row) -> str:
     """Return the mesh of a setting in short."""
     elements = row["elements"]
@@ -128,7 +121,7 @@ def recommendations(
         if refused:
             together = sum(entry["time"] or 0.0 for entry in refused)
             missing += f"; {len(refused)} settings were left out, of about {together:.2g} s: {refused[0]['why']}"
-    listed = [{"accuracy": a, "setting": r and setting_of(r).words(), "row": r} for a, r in best.items()]
+    listed = [{"accuracy": a, "setting": r and Setting.of(r).words(), "row": r} for a, r in best.items()]
     found = {"recommended": row, "promise": promise, "closest": closest, "missing": missing}
     return {**found, "recommendations": listed}
 
@@ -188,10 +181,10 @@ class CostResult(Rows):
             raise self.missed(wanted)
         remark = (
             f"# {self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}: "
-            f"{setting_of(row).words()}.\n# Measured: error {judged(row):.1e}, known to "
+            f"{Setting.of(row).words()}.\n# Measured: error {judged(row):.1e}, known to "
             f"{self.summary['uncertainty']:.0e}; {_cost(row)} with set-up.\n\n"
         )
-        return write_tuned(self.scene, setting_of(row), Path(path), remark)
+        return write_tuned(self.scene, Setting.of(row), Path(path), remark)
 
     def report(self) -> list[str]:
         """Return the lines `cost` prints: the table (its Pareto front, if long), model errors, the recommendation."""
@@ -211,11 +204,11 @@ class CostResult(Rows):
             lines.append(f"{len(refused)} settings were left out for want of time or memory")
         if (row := summary["recommended"]) is not None:
             errors = f"error {percent(judged(row))}, known to {percent(summary['uncertainty'])}"
-            return [*lines, f"for a relative accuracy of {wanted}: {setting_of(row).words()}; {errors}, {_cost(row)}"]
+            return [*lines, f"for a relative accuracy of {wanted}: {Setting.of(row).words()}; {errors}, {_cost(row)}"]
         lines.append(f"no setting is known to be within {wanted} (relative): {summary['missing']}")
         if (near := summary["closest"]) is not None:
             row = near["row"]
-            lines.append(f"within {percent(near['within'])}: {setting_of(row).words()}, {_cost(row)}")
+            lines.append(f"within {percent(near['within'])}: {Setting.of(row).words()}, {_cost(row)}")
         return lines
 
     def tables(self) -> list[ShortTable]:

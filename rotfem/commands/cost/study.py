@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from rotfem import registry
 from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, bytes_of, fingerprint
-from rotfem.commands.cost.result import CostResult, Reference, pareto, recommend, recommendations, setting_of
+from rotfem.commands.cost.result import CostResult, Reference, pareto, recommend, recommendations
 from rotfem.commands.cost.settings import (
     MESHES,
     Chosen,
@@ -167,7 +167,7 @@ class Study:
         rows = self.rows()
         best = recommend(rows, accuracy, self.uncertainty)
         for row in sorted((row for row in rows if row["pareto"]), key=lambda row: row is not best):
-            self.get(setting_of(row), row["purpose"], self.repeat)  # timed as often as was asked for
+            self.get(Setting.of(row), row["purpose"], self.repeat)  # timed as often as was asked for
         progress(1.0)
         rows = self.rows()
         self._check_computed(rows)
@@ -235,7 +235,7 @@ class Study:
         if not any(row["status"] == "done" for row in candidates):
             why = "the budget is too small"
             if candidates:
-                why = f"{setting_of(candidates[-1]).words()}: {candidates[-1]['reason']}"
+                why = f"{Setting.of(candidates[-1]).words()}: {candidates[-1]['reason']}"
             raise ComputationError(f"no setting could be computed ({why})")
         if self.output == "tip" and self.truth is not None and not np.any(self.truth.values):
             raise SceneError(self.scene.file, "cost --of", "tip", 'the tip does not move; try output "frequencies"')
@@ -325,7 +325,7 @@ class Study:
             least: dict[tuple[Any, ...], float] = {}
             for row in self.rows():
                 error = row["total_error"]
-                for part in parts_of(setting_of(row)) if error is not None else ():
+                for part in parts_of(Setting.of(row)) if error is not None else ():
                     least[part] = min(error, least.get(part, inf))
 
             def rank(entry: tuple[Setting, float], least: Mapping[Any, float] = least) -> tuple[bool, bool, float]:
