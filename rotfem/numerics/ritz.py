@@ -255,8 +255,9 @@ class RitzPairs:
         # The square of a larger eigenvalue, times anything, may be no number any more.
         upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
         zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * self.norms[2]
-        pairs = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ
-        upper &= ~((values.real < 0.0) & np.any(pairs & zero[:, None] & zero, axis=0))
+        pairs = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ, or ±iλ
+        falling = (values.imag == 0.0) & (values.real < 0.0)
+        upper &= ~(falling & np.any(pairs & zero[:, None] & zero, axis=0))
         if not np.any(upper):
             raise ComputationError("damping is so far out of proportion that no mode is left")
         values, x, y = values[upper], x[:, upper], y[:, upper]

@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import scipy.linalg as sl
+from petsc4py import PETSc
 
 from rotfem import ComputationError, campbell, modes
+from rotfem.numerics.ritz import RitzPairs
 from tests.beams import STRUCTURE
 
 Array = npt.NDArray[Any]
@@ -194,3 +196,17 @@ def test_a_damper_at_a_hinge_without_a_spring(damper: float, damping: dict[str, 
     for other in found[1:]:
         assert [label for label, *_ in other] == [label for label, *_ in found[0]]
         np.testing.assert_allclose([r[1:] for r in other], [r[1:] for r in found[0]], rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("split", [1e-15, -1e-15])
+def test_a_double_zero_is_one_mode_whatever_round_off_makes_of_it(split: float) -> None:
+    """A pair ±iε whose damping is round-off, or a pair ±ε: λ² + 1e-12 λ + split = 0."""
+
+    def diagonal(*entries: float) -> Any:
+        return PETSc.Mat().createAIJ((3, 3), csr=([0, 1, 2, 3], [0, 1, 2], entries), comm=PETSc.COMM_SELF)
+
+    matrices = diagonal(1.0, 1.0, 1.0), diagonal(1e-12, 0.5, 0.5), diagonal(split, 4.0, 9.0)
+    ritz = RitzPairs(matrices, np.eye(3), 1.0)
+    ritz.solve(3)
+    assert np.abs(ritz.values[0]) < 1e-6
+    np.testing.assert_allclose(ritz.values[1:].imag, np.sqrt([4.0 - 1 / 16, 9.0 - 1 / 16]), rtol=1e-12)
