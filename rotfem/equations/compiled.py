@@ -12,6 +12,7 @@ from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.time_signals import View, watched
+from rotfem.structures.structure import check_memory
 
 
 def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True, parted: bool = False) -> Any:
@@ -32,6 +33,11 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     seen, signals = watched(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
     system: Any
+    if problem.theory.linear and moving:  # its pieces are held apart, 14 kB for each unknown of a plate
+        V, file = model.structure.V, getattr(problem.structure, "mesh", None)
+        key, value = ("mesh.elements", problem.mesh.elements) if file is None else ("structure.mesh", str(file))
+        nodes, components, dimension = V.dofmap.index_map.size_global, V.dofmap.index_map_bs, V.mesh.topology.dim
+        check_memory(key, value, nodes, components, dimension, comm, times=2.0)
     if problem.theory.linear:
         system = AffineSystem(model, moving, parted)
         if not parted:

@@ -28,8 +28,10 @@ from rotfem.structures.reference_rotation import Turns
 Array = npt.NDArray[np.float64]
 
 
-def check_memory(key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm) -> None:
-    """Refuse a mesh whose matrices cannot be held, whatever is computed with them.
+def check_memory(
+    key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm, times: float = 1.0
+) -> None:
+    """Refuse a mesh whose matrices cannot be held.
 
     Args:
         key: what asks for so many elements.
@@ -38,6 +40,7 @@ def check_memory(key: str, value: object, nodes: float, components: int, dimensi
         components: unknowns of a node.
         dimension: of the mesh.
         comm: communicator that shares it; on every process the same is raised.
+        times: memory of what is computed over that of what takes least, modes.
 
     Raises:
         InputError: says how much would be needed, and how much there is.
@@ -47,8 +50,8 @@ def check_memory(key: str, value: object, nodes: float, components: int, dimensi
         return
     # Bytes per unknown, component and dimension of the mesh, of what takes least, so that nothing is refused that fits:
     # modes of plates of 10⁵ to 10⁶ unknowns took 6.7 to 8 kB per unknown, on two processes together 29 to 32 kB;
-    # planar beams of 4·10⁴ elements 3 kB (degrees 1 and 3). Histories and diagrams take more (docs/scaling.md).
-    needed = 670 * (4.3 if comm.size > 1 else 1.0) * components * dimension * unknowns
+    # planar beams of 4·10⁴ elements 3 kB (degrees 1 and 3). Errors of histories take more (docs/scaling.md).
+    needed = times * 670 * (4.3 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
         raise InputError(

@@ -95,6 +95,16 @@ def test_memory_is_asked_for_before_the_mesh_is_made(monkeypatch: pytest.MonkeyP
         check_memory("mesh.elements", 0, 1e6, 3, 1, MPI.COMM_SELF)
 
 
+def test_histories_of_linear_theories_are_counted_with_what_their_pieces_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    plate = {"type": "plate", "length": 2.0, "width": 1.0, "thickness": 0.01, "E": 7e9, "nu": 0.3, "rho": 2700.0}
+    model = {"theory": "consistent_linear"}
+    scene = {"structure": plate, "motion": TABLES["motion"], "model": model, "mesh": {"elements": [100, 50]}}
+    scene["loads"] = {"pressure": 1.0}
+    monkeypatch.setenv("ROTFEM_MEMORY", "1")  # modes would take 0.7 GB
+    with pytest.raises(SceneError, match=r"mesh.elements = \[100, 50\]: makes 1.02e\+05 unknowns, which need 1.36 GB"):
+        rotfem.run({**scene, "time": {"end": 0.1, "step": 0.1}})
+
+
 def test_what_a_script_makes_is_checked_as_a_scene_is() -> None:
     with pytest.raises(InputError, match=r"PlanarBeamStructure: length = -1: must be greater than 0"):
         rotfem.PlanarBeam(length=-1, section=SECTION)
