@@ -175,9 +175,8 @@ class Linearised:
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
         self._b.array[:] = real
-        found = self._complex.solve(complex_)
-        parts = with_ghosts(self.system.held.V, np.column_stack([found.real, found.imag]))
-        return self._part.solve(self._real, self._b).copy(), parts[:, 0] + 1j * parts[:, 1]
+        found = with_ghosts(self.system.held.V, self._complex.solve(complex_))
+        return self._part.solve(self._real, self._b).copy(), found
 
 
 class BorderedLinearised(Linearised):

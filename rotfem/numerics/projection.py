@@ -30,6 +30,8 @@ def with_ghosts(V: fem.FunctionSpace, owned: Array) -> Array:
     """Return local dof arrays, (n,) or (n, k), of owned rows: with those of other processes that are seen here."""
     if V.mesh.comm.size == 1:
         return owned
+    if np.iscomplexobj(owned):
+        return with_ghosts(V, owned.real) + 1j * with_ghosts(V, owned.imag)
     function, columns = fem.Function(V), owned if owned.ndim > 1 else owned[:, None]
     out = np.empty((len(function.x.array), columns.shape[1]))
     for column, x in zip(out.T, columns.T, strict=True):
