@@ -162,7 +162,7 @@ def resolved(
         most: frequencies that may be added.
     """
     least, left = NARROW * float(omegas[-1] - omegas[0]), most
-    units = np.array([described(name)[1] for name in outputs])
+    units = units_of(outputs)
     of_one_unit = units[:, None] == units
     while left > 0:
         sizes = np.abs(values)
@@ -181,6 +181,11 @@ def resolved(
         omegas = np.insert(omegas, chosen + 1, further)
         left -= len(further)
     return omegas, values
+
+
+def units_of(outputs: Sequence[str]) -> Array:
+    """Return the units of outputs by their names, an array of strings."""
+    return np.array([described(name)[1] for name in outputs])
 
 
 def angular(value: float | str | None, option: str, default: float) -> float:
@@ -262,7 +267,7 @@ def differences(outputs: Sequence[str], direct: Array, modal: Array, kind: str) 
         modal: the same by modes.
         kind: what the names of those begin with that count.
     """
-    units = np.array([described(name)[1] for name in outputs])
+    units = units_of(outputs)
     chosen, out = np.array([name.startswith(kind) for name in outputs]), np.zeros(len(direct))
     for unit in dict.fromkeys(units[chosen]):
         those = chosen & (units == unit)
