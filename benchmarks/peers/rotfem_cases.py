@@ -34,9 +34,9 @@ THIN = {"EA": 1e6, "GA": 1e6, "EI": 1.0, "mass_per_length": 1.0}
 PLATE = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
 
 
-def spin_up(elements: int, steps: int, scheme: str) -> tuple[float, Values]:
+def spin_up(elements: int, steps: int, scheme: str, degree: int) -> tuple[float, Values]:
     """Return seconds of the time loop, and rows of t, u₂ of the tip."""
-    seconds, rows = marched(SPIN_UP, elements, steps, scheme)
+    seconds, rows = marched(SPIN_UP, elements, steps, scheme, degree)
     return seconds, [[row[0], row[2]] for row in rows]
 
 
@@ -46,7 +46,7 @@ def spatial(elements: int, steps: int, scheme: str, degree: int) -> tuple[float,
 
 
 def marched(
-    scene: dict[str, Any], elements: int, steps: int, scheme: str, degree: int = 3, hanging: bool = False
+    scene: dict[str, Any], elements: int, steps: int, scheme: str, degree: int, hanging: bool = False
 ) -> tuple[float, Values]:
     """March; return seconds of the time loop, and rows of t and the displacement of the tip.
 
