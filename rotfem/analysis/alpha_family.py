@@ -68,7 +68,7 @@ class AlphaFamily(Scheme):
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         maps, c_v, c_a = update_maps(self.coefficients, h)
-        q, v, carried = maps @ np.array((state.q, state.v, state.a, state.memory))
+        q, v, carried = maps.dot(np.array((state.q, state.v, state.a, state.memory)))
         return Stage(end, q, v, state.a.copy(), c_v, c_a, carried=carried)
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:

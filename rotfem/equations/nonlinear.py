@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,7 @@ from rotfem.equations.model import Both
 from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import added, weighted
-from rotfem.numerics.linear import set_diagonal
+from rotfem.numerics.forms import Assembler, added, weighted
 
 Array = npt.NDArray[np.float64]
 
@@ -120,6 +119,8 @@ class NonlinearSystem(System):
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._spin: Any = None
+        self._signs = np.full_like(self._b_array, -1.0)
+        self._signs[self.clamped] = 0.0
         if self.moving:
             residuals = self.model.by_strains() if self.parted else [self._residual_form]
             libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
@@ -132,7 +133,14 @@ class NonlinearSystem(System):
         else:
             self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
-        return fem_petsc.create_matrix(self._pattern)
+        self._assemble = Assembler(self._pattern, self.bcs)
+        return self._assemble.zero()
+
+    def twin(self) -> Self:
+        """Return another system of the same forms (see `System.twin`)."""
+        other = super().twin()
+        other.A = self._assemble.zero()
+        return other
 
     @cached_property
     def _residual_form(self) -> Any:
@@ -198,8 +206,7 @@ class NonlinearSystem(System):
 
     def _negative(self, parts: list[Any], moving: bool) -> Any:
         b = self.sum_of(parts)
-        np.negative(b, out=b)
-        b[self.clamped] = 0.0
+        b *= self._signs
         if moving and self.by_mode is not None:
             owned = self.b.array
             owned -= self.by_mode.times(self._state[1][: len(owned)])
@@ -208,10 +215,10 @@ class NonlinearSystem(System):
     def sum_of(self, parts: list[Any]) -> Array:
         """Return compiled linear forms added up, a local dof array (reused) whose owned part counts."""
         b: Array = self._b_array
-        b[:] = 0.0
+        b.fill(0.0)
         for form in parts:
-            fem.assemble_vector(b, form)
-        if self.comm.size > 1:
+            forms.add_vector(b, form)
+        if self.shared:
             self._b.scatter_reverse(la.InsertMode.add)
         return b
 
@@ -236,13 +243,7 @@ class NonlinearSystem(System):
 
     def whole_of(self, parts: list[Any]) -> Any:
         """Return compiled bilinear forms added up, a new matrix with the rows of the clamp; None of none."""
-        if not parts:
-            return None
-        A = self._empty.duplicate()
-        for form in parts:
-            fem_petsc.assemble_matrix(A, form)
-            A.assemble()
-        return A
+        return self._assemble(*parts) if parts else None
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.
@@ -253,30 +254,17 @@ class NonlinearSystem(System):
             c_m: factor of M.
             before: q from which a correction has led to the state (see `PointStresses`); None for the true tangent.
         """
-        self.A.zeroEntries()
         if before is None or self.plain:
-            self._assemble(self.A, (c_k, c_v, c_m), 1.0)
+            parts = self._terms((c_k, c_v, c_m))
         else:
             self._stresses.come_from(before)
             self.shift((c_k, c_v, c_m))
-            fem_petsc.assemble_matrix(self.A, self._on_the_way, self.bcs)
-            self.A.assemble()
-        return self.with_modes(self.A, c_v), True
+            parts = [self._on_the_way]
+        return self.with_modes(self._assemble(*parts, diagonal=1.0, into=self.A), c_v), True
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-        A = self._empty.duplicate()
-        self._assemble(A, (c_k, c_v, c_m), diagonal)
-        return self.with_modes(A, c_v)
-
-    @cached_property
-    def _empty(self) -> Any:
-        """A matrix with the pattern of all tangents and zeros in it."""
-        A = fem_petsc.create_matrix(self._pattern)
-        fem_petsc.assemble_matrix(A, self._pattern, self.bcs)
-        A.assemble()
-        A.zeroEntries()
-        return A
+        return self.with_modes(self._assemble(*self._terms((c_k, c_v, c_m)), diagonal=diagonal), c_v)
 
     def shift(self, shifts: tuple[float, ...]) -> None:
         """Set the factors of K, C and M in the form J."""
@@ -285,20 +273,15 @@ class NonlinearSystem(System):
                 constant.value = value
             self._shift_values[:] = shifts
 
-    def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
+    def _terms(self, shifts: tuple[float, float, float]) -> list[Any]:
+        """Return the compiled forms whose sum is c_k K + c_v C + c_m M."""
         if self.moving:
             self.shift(shifts)
-            for form in self._J:
-                fem_petsc.assemble_matrix(A, form, self.bcs, diagonal)
-                A.assemble()
-            return
+            return self._J
         wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
         assert shifts == tuple(float(name in wanted) for name in "KCM")
         assert len(wanted) == 1
-        if wanted[0] in self._parts:
-            fem_petsc.assemble_matrix(A, self._parts[wanted[0]], self.bcs, 0.0)
-        A.assemble()
-        set_diagonal(self.clamped, A, diagonal)
+        return [self._parts[wanted[0]]] if wanted[0] in self._parts else []
 
     @cached_property
     def _by_spin(self) -> BySpin:

@@ -85,7 +85,7 @@ class System(Solutions, ABC):
     def __init__(self, model: Model, moving: bool = True, parted: bool = False):
         self.view, self.parted = View(), parted
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
-        self.comm = model.comm
+        self.comm, self.shared = model.comm, model.comm.size > 1
         self.q, self.v, self.a, _ = self.structure.k.functions
         self.V = self.structure.V
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
@@ -233,8 +233,8 @@ class System(Solutions, ABC):
 
     def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
         """Write local dof arrays into the functions q, v, a that the forms are evaluated at; zero where None."""
-        for target, value in zip(self._state, (q, v, a), strict=True):
-            target[:] = 0.0 if value is None else value
+        to_q, to_v, to_a = self._state
+        to_q[:], to_v[:], to_a[:] = q, 0.0 if v is None else v, 0.0 if a is None else a
 
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Write the frame and load constants of time t (s), for the problem's motion unless another is given.
@@ -334,8 +334,8 @@ class System(Solutions, ABC):
 
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks; a hub's angle apart."""
-        here = float((np.abs(x[: len(self.scale)]) / self.scale).max()) if x.size else 0.0
-        return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
+        here = float(np.maximum.reduce(np.abs(x[: len(self.scale)]) / self.scale, initial=0.0))
+        return self.comm.allreduce(here, op=MPI.MAX) if self.shared else here
 
     def product(self, x: Array, y: Array) -> float:
         """Return the sum of the products of the entries of two local dof arrays in units of `scale`, over all ranks."""

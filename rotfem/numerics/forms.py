@@ -14,7 +14,7 @@ import ffcx.codegeneration.jit as ffcx_jit
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem, la
+from dolfinx import cpp, fem, la
 from dolfinx import jit as dolfinx_jit
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
@@ -48,11 +48,13 @@ class Assembler:
 
     def __init__(self, form: Any, bcs: list[Any]):
         self._own: Any = None
+        self._bcs, self._held = bcs, [bc._cpp_object for bc in bcs]
         if form.mesh.comm.size == 1:
             self._own = fem.create_matrix(form, la.BlockMode.expanded)
+            self._entries: npt.NDArray[np.float64] = np.asarray(self._own.data)
             self._rows, self._columns = (np.array(x, PETSc.IntType) for x in (self._own.indptr, self._own.indices))
-            size = (len(self._rows) - 1,) * 2
-            self._sizes, self._block, self._comm = size, form.function_spaces[0].dofmap.index_map_bs, form.mesh.comm
+            size, self._space = (len(self._rows) - 1,) * 2, form._cpp_object.function_spaces[0]
+            self._sizes, self._block, self._comm = size, self._space.dofmap.index_map_bs, form.mesh.comm
             self._kept: npt.NDArray[np.intp] | None = None
             self.pattern = self._with(np.zeros(len(self._columns)))
             return
@@ -63,6 +65,7 @@ class Assembler:
     def release(self) -> None:
         """Give back the memory of a matrix; PETSc assembles what is still to come."""
         self._own = self._kept = None
+        self._entries = np.empty(0)
 
     def zero(self) -> Any:
         """Return a new matrix of zeros, which takes up memory when it is filled."""
@@ -72,15 +75,28 @@ class Assembler:
         A.zeroEntries()
         return A
 
-    def __call__(self, form: Any) -> Any:
-        """Return a compiled form as a new matrix, nothing held."""
+    def __call__(self, *several: Any, diagonal: float | None = None, into: Any = None) -> Any:
+        """Return compiled forms added up as a matrix.
+
+        Args:
+            several: the forms.
+            diagonal: of the rows and columns of what is held, zero otherwise; None where nothing is held.
+            into: a matrix that `zero` has made, to be overwritten; a new one if None.
+        """
         if self._own is None:
-            A = self.zero()
-            fem_petsc.assemble_matrix(A, form)
-            A.assemble()
+            A = self.zero() if into is None else into
+            A.zeroEntries()
+            for form in several:
+                fem_petsc.assemble_matrix(A, form, *(() if diagonal is None else (self._bcs, diagonal)))
+                A.assemble()
             return A
-        entries = self._assembled(form)
-        return self._with(entries.copy() if self._kept is None else entries[self._kept])
+        entries = self._assembled(*several, diagonal=diagonal)
+        entries = entries if self._kept is None else entries[self._kept]
+        if into is None:
+            return self._with(entries.copy())
+        into.getAttr("__csr__")[2][:] = entries
+        into.stateIncrease()
+        return into
 
     def narrow(self, several: Iterable[Any]) -> None:
         """Take components of nodes that no form couples out of the pattern, as those of a flat plate in and across it.
@@ -105,12 +121,15 @@ class Assembler:
         self._columns = self._columns[self._kept]
         self.pattern = self._with(np.zeros(len(self._columns)))
 
-    def _assembled(self, *several: Any) -> npt.NDArray[np.float64]:
+    def _assembled(self, *several: Any, diagonal: float | None = None) -> npt.NDArray[np.float64]:
         """Return the entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
-        self._own.set_value(0.0)
+        A, held = self._own._cpp_object, [] if diagonal is None else self._held
+        self._entries.fill(0.0)
         for form in several:
-            fem.assemble_matrix(self._own, form)
-        return np.asarray(self._own.data)
+            cpp.fem.assemble_matrix(A, *packed(form), held)
+        if diagonal is not None:
+            cpp.fem.insert_diagonal(A, self._space, held, diagonal)
+        return self._entries
 
     def _with(self, entries: npt.NDArray[np.float64]) -> Any:
         csr = (self._rows, self._columns, entries)
@@ -118,6 +137,17 @@ class Assembler:
         A.setBlockSize(self._block)  # which `createAIJWithArrays` does not heed
         A.assemble()
         return A
+
+
+def packed(form: Any) -> tuple[Any, Any, Any]:
+    """Return what dolfinx assembles of a compiled form: its code, and its constants and coefficients of now."""
+    code = form._cpp_object
+    return code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code)
+
+
+def add_vector(b: npt.NDArray[np.float64], form: Any) -> None:
+    """Add a compiled linear form to a local dof array."""
+    cpp.fem.assemble_vector(b, *packed(form))
 
 
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or

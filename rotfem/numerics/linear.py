@@ -129,7 +129,7 @@ class DirectSolver:
     def refresh(self, A: Any = None) -> None:
         """Say that the entries of A have changed, or that it is another matrix of its pattern now."""
         self._stale = True
-        if A is not None:
+        if A is not None and A is not self._whole:
             self._whole, self.A = A, sparse_part(A)
 
     def factorise(self) -> None:

@@ -109,12 +109,12 @@ class Newton:
         for k in range(1, self.max_iterations + 1):
             d = increment()
             self.iterations += 1
-            if not np.isfinite(d):
+            if not math.isfinite(d):
                 raise ComputationError(f"Newton iteration {k} gave an increment that is not finite")
             if k == 1:
                 first = d
             if k == 2 and first > 0 and chord is None:
-                self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
+                self._kappa = max(0.5 * self._kappa if math.isfinite(self._kappa) else 0.0, d / first**2)
                 self._longest = max(first, 0.5 * self._longest)
             if chord is not None:
                 # Newton's last increment leaves an error of its square; those with an old factor leave a part of
