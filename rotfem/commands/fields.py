@@ -46,18 +46,6 @@ class Snapshots:
                 self.kept, self._every = self.kept[::2], 2 * self._every
         self._count += 1
 
-    def put_back(self, known: dict[str, Any], count: int) -> None:
-        """Take all attributes that there were after so many states.
-
-        Raises:
-            ValueError: it is not what there is after so many.
-        """
-        kept, every = known["kept"], known["_every"]
-        due = count if every == 1 else 1 + (count - 1) // every
-        if known["_count"] != count or len(kept) != due or not 0 < len(kept) <= MOST or set(known) != set(vars(self)):
-            raise ValueError(f"{len(kept)} snapshots after {count} states")
-        self.kept, self._every, self._count = [(float(t), np.asarray(x)) for t, x in kept], every, count
-
 
 def fields_writer(system: Any, states: list[tuple[float, Array]], more: Named | None = None) -> Writer:
     """Return what writes fields.xdmf and fields.h5 of a run into a folder, on all ranks together.

@@ -72,23 +72,14 @@ class ResultantRows:
         """Return the largest equivalent stress (Pa), where (m) and when (s)."""
         return dict(zip((STRESS, "x", "y", "t"), self.largest, strict=False))
 
-    def kept_arrays(self) -> dict[str, Any]:
+    def known(self) -> dict[str, Any]:
         """Return what a checkpoint has of it."""
-        return {"frames": vars(self.frames), "last": self.last, "largest": list(self.largest)}
+        return {"frames": vars(self.frames), "last": self.last, "largest": self.largest}
 
-    def put_back(self, known: dict[str, Any], rows: int) -> None:
-        """Take what a checkpoint has, where the history has so many rows.
-
-        Raises:
-            ValueError: it is not what there is after so many.
-        """
-        last = known["last"]
-        if (
-            any(x.shape != last.shape for _, x in known["frames"]["kept"]) or len(known["largest"]) != 4
-        ):  # value, x, y, t
-            raise ValueError("resultants")
-        self.frames.put_back(known["frames"], rows)
-        self.last, self.largest = last, tuple(known["largest"])
+    def put_back(self, known: dict[str, Any]) -> None:
+        """Take what a checkpoint has."""
+        vars(self.frames).update(known["frames"])
+        self.last, self.largest = known["last"], known["largest"]
 
 
 class StationRows:
@@ -119,21 +110,13 @@ class StationRows:
             self.kept.append((t, values))
         self.seen += 1
 
-    def kept_arrays(self) -> dict[str, Any]:
+    def known(self) -> dict[str, Any]:
         """Return what a checkpoint has of it."""
-        return {"seen": self.seen, "t": [t for t, _ in self.kept], "values": [x.tolist() for _, x in self.kept]}
+        return {"seen": self.seen, "kept": self.kept}
 
-    def put_back(self, known: dict[str, Any], rows: int) -> None:
-        """Take what a checkpoint has, where the history has so many rows.
-
-        Raises:
-            ValueError: it is not what there is after so many.
-        """
-        t, values = np.array(known["t"], dtype=float), np.array(known["values"], dtype=float)
-        shape = 1 + (rows - 1) // self.output.every, len(self._stations.positions), len(self.names)
-        if known["seen"] != rows or t.shape != shape[:1] or values.shape != shape:
-            raise ValueError(f"values at stations of shape {values.shape} instead of {shape}")
-        self.seen, self.kept = rows, [(float(a), x) for a, x in zip(t, values, strict=True)]
+    def put_back(self, known: dict[str, Any]) -> None:
+        """Take what a checkpoint has."""
+        self.seen, self.kept = known["seen"], known["kept"]
 
     def result(self) -> StationHistory:
         """Return what has been kept."""

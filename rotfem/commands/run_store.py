@@ -10,7 +10,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Tree, check_identity, check_parts, comparable, identity, trusted
+from rotfem.commands.checkpoint import Memory, Tree, check_identity, comparable, identity
 from rotfem.commands.interrupts import Interrupts
 from rotfem.errors import OutputError, SceneError, Stopped
 from rotfem.refinement.refine import Setting
@@ -93,8 +93,6 @@ class RunStore:
 
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
-            with trusted(path):
-                check_parts(tree)
             check_identity(path, tree, self._identity, end)
             return tree
 

@@ -1,7 +1,8 @@
 """The file of a checkpoint: HDF5 with a head that says what it is and what its content must sum up to.
 
-The head, the user block of the HDF5 file, is text: format, length and SHA-256 of what follows. The content is a tree of
-plain values as JSON, with arrays as datasets of their own. Nothing in it is code.
+The head, the user block of the HDF5 file, is text: format, length and SHA-256 of what follows. A file with a right sum
+is trusted to be what this program wrote. The content is a tree of plain values as JSON, with arrays as datasets of
+their own. Nothing in it is code.
 """
 
 from __future__ import annotations
@@ -9,28 +10,37 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import sys
+from dataclasses import fields, is_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from rotfem.errors import SceneError
+from rotfem.errors import ComputationError, SceneError
 from rotfem.results.files import CHECKPOINT_MAGIC as MAGIC
 from rotfem.results.files import write_whole
 
 #: Number of the format; another one is refused.
-FORMAT = 1
+FORMAT = 2
 
 #: Length of the head of the file.
 HEAD = 512
 
+#: What a scheme may remember of the steps before.
+STORED = "a memory of the scheme that is of numbers, texts, arrays, tuples, lists, dicts and dataclasses"
+
 
 def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
-    """Write a tree (dicts, lists, numbers, text, arrays), whole or not at all, and wait until it is on the disk.
+    """Write a tree, whole or not at all, and wait until it is on the disk.
+
+    It is of dicts, lists, tuples, dataclasses of the program, arrays, numbers and text.
 
     Raises:
         OutputError: it cannot be written; the one before is still there.
+        ComputationError: something in it is of another type, and would be lost.
     """
     content = content_of(tree)
     head = f"{MAGIC} {FORMAT}\n{len(content)}\n{hashlib.sha256(content).hexdigest()}\n".encode().ljust(HEAD, b"\0")
@@ -73,38 +83,20 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     content = data[HEAD:]
     if words[2:] != [str(len(content)), hashlib.sha256(content).hexdigest()]:
         raise refused("is damaged: it does not sum up to what its head says; start the run anew, without --resume")
-    try:
-        with h5py.File(io.BytesIO(data), "r") as file:
-            text = _array(file["tree"], len(data)).tobytes().decode()
-            arrays = [_array(file[f"arrays/{i}"], len(data)) for i in range(len(file.get("arrays", ())))]
-        tree = _full(json.loads(text), arrays)
-    except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError, RecursionError) as error:
-        raise refused(f"is damaged ({type(error).__name__}); start the run anew, without --resume") from None
-    if not isinstance(tree, dict):
-        raise refused("is damaged (no tree); start the run anew, without --resume")
+    with h5py.File(io.BytesIO(data), "r") as file:
+        text = file["tree"][()].tobytes().decode()
+        arrays = [file[f"arrays/{i}"][()] for i in range(len(file.get("arrays", ())))]
+    tree: dict[str, Any] = _full(json.loads(text), arrays)
     return tree
 
 
-def _array(data: Any, size: int) -> np.ndarray[Any, Any]:
-    """Return an HDF5 dataset of numbers that lies in the file as it is, so that it takes no more memory than that.
-
-    Args:
-        data: the dataset.
-        size: of the file, bytes.
+def _plain(value: Any, arrays: list[Any]) -> Any:
+    """Return a tree that JSON knows; arrays are put into the list and referred to by their place in it.
 
     Raises:
-        ValueError: it is none: packed, of text, elsewhere, or of a shape that is not all in the file.
+        ComputationError: something in it is of another type, and would be lost.
     """
-    placed = data.size == 0 or data.id.get_offset() is not None  # what is packed, missing or elsewhere has no place
-    if data.dtype.kind not in "biufc" or not placed or data.nbytes > size:
-        raise ValueError("a dataset is not in the file")
-    out: np.ndarray[Any, Any] = data[()]
-    return np.asarray(out)
-
-
-def _plain(value: Any, arrays: list[Any]) -> Any:
-    """Return a tree that JSON knows; arrays are put into the list and referred to by their place in it."""
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
         arrays.append(value)
         return {"array": len(arrays) - 1}
     if isinstance(value, dict):
@@ -113,10 +105,18 @@ def _plain(value: Any, arrays: list[Any]) -> Any:
         return {"tuple": [_plain(entry, arrays) for entry in value]}
     if isinstance(value, list):
         return [_plain(entry, arrays) for entry in value]
-    return value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, np.generic):
+        return value.item()
+    if is_dataclass(value):
+        values = {field.name: _plain(getattr(value, field.name), arrays) for field in fields(value)}
+        return {f"{type(value).__module__}:{type(value).__qualname__}": values}
+    if value is not None and not isinstance(value, bool | int | float | str):
+        raise ComputationError(f"a checkpoint cannot hold a {type(value).__qualname__}", advice=STORED)
+    return value
 
 
 def _full(value: Any, arrays: list[Any]) -> Any:
+    """Return the tree that `_plain` has made one of JSON."""
     if isinstance(value, list):
         return [_full(entry, arrays) for entry in value]
     if not isinstance(value, dict):
@@ -126,4 +126,14 @@ def _full(value: Any, arrays: list[Any]) -> Any:
         return arrays[entry]
     if kind == "tuple":
         return tuple(_full(part, arrays) for part in entry)
-    return {key: _full(part, arrays) for key, part in entry.items()}
+    inner = {key: _full(part, arrays) for key, part in entry.items()}
+    return inner if kind == "dict" else _record(kind)(**inner)
+
+
+def _record(name: str) -> Any:
+    """Return a dataclass of the program, or of what it has loaded, by "module:name"; nothing else is made of a file."""
+    module, _, attribute = name.partition(":")
+    found = getattr(import_module(module) if module.startswith("rotfem.") else sys.modules.get(module), attribute, None)
+    if not (isinstance(found, type) and is_dataclass(found)):
+        raise SceneError("command line", "--resume", name, "is no dataclass of rotfem or of what --load has read")
+    return found
