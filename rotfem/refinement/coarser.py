@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import inf, prod
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,9 @@ class OtherMesh:
 def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: bool = False) -> OtherMesh | None:
     """Return a problem on half the cells or a finer mesh, without what its own system leaves out.
 
-    Where the nodes that a section, a mass or a load asks for fix the cells they are halved in length, and those of a
-    mesh file have one degree more. None where there is no other mesh at all.
+    Half the cells will do where all are longer there. Where the nodes that a section, a mass or a load asks for fix
+    some, or there is one cell across, all are halved in length; those of a mesh file have one degree more. None where
+    there is no other mesh at all.
 
     Args:
         problem: what is computed.
@@ -58,10 +60,9 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: boo
         finer: whether only a finer mesh will do.
     """
     problem = problem.replace(outputs={})
-    nodes = system.V.dofmap.index_map.size_global
-    cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
-    for mesh, ratio in _meshes(problem, cells):
-        if finer and ratio > 1.0:
+    nodes, cells = system.V.dofmap.index_map.size_global, _cells(system)
+    for mesh, ratio, most in _meshes(problem, cells):
+        if ratio == 1.0 or (finer and ratio > 1.0):
             continue
         try:
             other = compile_system(problem.replace(mesh=mesh), system.comm, moving, system.held.parted)
@@ -69,27 +70,30 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: boo
                 other.leave_out(system.held.left_out)
         except InputError:
             continue
-        if other.V.dofmap.index_map.size_global != nodes:
+        if other.V.dofmap.index_map.size_global != nodes and _cells(other) < most + 1:
             return OtherMesh(other, ratio, max(2, system.V.element.basix_element.degree))
     return None
 
 
-def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float]]:
-    """Yield meshes, and the ratios of their cell sizes to those of a problem; of an odd number, half is less than 2."""
+def _cells(system: Any) -> int:
+    topology = system.structure.mesh.topology
+    return int(topology.index_map(topology.dim).size_global)
+
+
+def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float, float]]:
+    """Yield meshes, the ratios of their cell sizes to those of a problem, and most cells with which these hold.
+
+    Of an odd number of cells half are less than twice as long.
+    """
     mesh = problem.mesh
     if getattr(problem.structure, "mesh_file", None) is not None:  # a structure of a user need not say it
-        yield mesh.model_copy(update={"degree": mesh.degree + 1}), 0.5
+        yield mesh.model_copy(update={"degree": mesh.degree + 1}), 0.5, inf
         return
-    n = mesh.elements
-    if isinstance(n, tuple):
-        half = tuple((k + 1) // 2 for k in n)
-        ratios = [k / h for k, h in zip(n, half, strict=True) if h < k]
-        yield mesh.model_copy(update={"elements": half}), min(ratios, default=1.0)
-        yield mesh.model_copy(update={"elements": tuple(2 * k for k in n)}), 0.5
-    else:
-        number = (cells + 1) // 2
-        yield mesh.model_copy(update={"elements": number}), cells / number
-        yield mesh.model_copy(update={"elements": 2 * cells}), 0.5
+    n = mesh.elements if isinstance(mesh.elements, tuple) else (cells,)
+    half, double = tuple((k + 1) // 2 for k in n), tuple(2 * k for k in n)
+    ratio, most = min(k / h for k, h in zip(n, half, strict=True)), cells * prod(half) / prod(n)
+    for elements, sizes, limit in ((half, ratio, most), (double, 0.5, inf)):
+        yield mesh.model_copy(update={"elements": elements if len(n) > 1 else elements[0]}), sizes, limit
 
 
 # --- shapes carried from one mesh to another -------------------------------------------------------------------------
