@@ -32,14 +32,14 @@ from rotfem.registry import register
 def update_maps(coefficients: tuple[float, float, float, float], h: float) -> tuple[Array, float, float]:
     """Return maps of a step of h (s), and ∂v/∂q and ∂a/∂q in it.
 
-    The maps (3, 4) take q, v, q̈ and â at its start to q and v at its end where q̈ stays, and to the part of â there that
-    does not change with q̈.
+    The maps (4, 4) take q, v, q̈ and â at its start to q, v and q̈ at its end where q̈ stays, and to the part of â there
+    that does not change with q̈.
     """
     alpha_m, alpha_f, beta, gamma = coefficients
     kept, moved = (alpha_f / (1 - alpha_m), -alpha_m / (1 - alpha_m)), np.array([1.0, -alpha_m]) / (1 - alpha_m)
     q, v = (np.array([0.0, 0.5 - beta]) + beta * moved) * h * h, (np.array([0.0, 1 - gamma]) + gamma * moved) * h
     c_a = 1 / (beta * h * h)
-    maps = np.array([[1.0, h, *q], [0.0, 1.0, *v], [0.0, 0.0, *kept]])
+    maps = np.array([[1.0, h, *q], [0.0, 1.0, *v], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, *kept]])
     return maps, gamma * h * c_a, (1 - alpha_m) / (1 - alpha_f) * c_a
 
 
@@ -68,8 +68,8 @@ class AlphaFamily(Scheme):
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         maps, c_v, c_a = update_maps(self.coefficients, h)
-        q, v, carried = maps.dot(np.array((state.q, state.v, state.a, state.memory)))
-        return Stage(end, q, v, state.a.copy(), c_v, c_a, carried=carried)
+        q, v, a, carried = maps.dot(np.array((state.q, state.v, state.a, state.memory)))
+        return Stage(end, q, v, a, c_v, c_a, carried=carried)
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the state of the one stage; the auxiliary acceleration follows from its definition."""

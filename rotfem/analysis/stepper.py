@@ -180,7 +180,7 @@ class Stepper:
         """
         end = state.t + h if end is None else end
         self._hard = False
-        state = self._filtered(state, h)
+        state = state if state.jump is None else self._filtered(state, h)
         stages = self.scheme.solved(state, h, end, self)
         new = self.scheme.finish(state, h, stages)
         new.reference = state.reference
@@ -342,8 +342,6 @@ class Stepper:
         if factor is not None and self.back_off.over():
             try:
                 self._iterate(stage, state, factor)
-                if factor.made and self.newton.diverging:
-                    check_root(self.system, stage, state)
             except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                 self._factored = None
                 self.back_off.failed()
@@ -357,14 +355,14 @@ class Stepper:
         if self._share < WHOLE:
             stage.correct((self._share - 1.0) * (stage.q - state.q))
         try:
-            iterations = self._root(stage, state)
+            iterations = self._iterate(stage, state)
         except ComputationError:
             if self._share == 0.0:
                 raise
             stage.begin_at(predicted)
             stage.correct(state.q - stage.q)  # from where the step starts, whatever was predicted
             self._share, self._far = 0.0, True
-            iterations = self._root(stage, state)
+            iterations = self._iterate(stage, state)
         self._hard |= self.newton.diverging or iterations > MANY
         self._balanced = stage.over is not None
         if self._share < WHOLE or iterations > MANY:
@@ -386,15 +384,12 @@ class Stepper:
             return None
         return OldFactor(held)
 
-    def _root(self, stage: Stage, state: State) -> int:
-        """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
-        iterations = self._iterate(stage, state)
-        if self.newton.diverging:
-            check_root(self.system, stage, state)
-        return iterations
-
     def _iterate(self, stage: Stage, state: State, factor: OldFactor | None = None) -> int:
-        """Solve a stage by Newton's method, with old factors as long as they serve if any do; return the iterations."""
+        """Solve a stage by Newton's method, with old factors as long as they serve if any do; return the iterations.
+
+        Raises:
+            ComputationError: it cannot be solved, or the root that was found is not the motion's.
+        """
         span = None if self.system.linear else stage.over
         s, before = self.system if span is None else self.system.balance, state.q
         followed = 0
@@ -428,6 +423,8 @@ class Stepper:
         self._far = iterations > SOON if factor is None else factor.made > MANY
         if span is not None:
             stage.memory = s.finish(stage)
+        if self.newton.diverging and (factor is None or factor.made) and not s.solved_at_once:
+            check_root(self.system, stage, state)
         return iterations
 
     def _solve_linear(self, increment: Any, stage: Stage, chord: bool) -> int:

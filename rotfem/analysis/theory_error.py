@@ -134,7 +134,7 @@ def error_of_state(system: Any, q: Array, tips: Array | None = None, time: float
     if displacement == 0.0:
         return TheoryError(rotation / 2, f"the largest rotation is {rotation:.2g}", name)
     tips = np.abs(_tip(system, q)) if tips is None else tips
-    moves, neglected = np.array(system.structure.moves), max(displacement, rotation) / 2
+    moves, neglected = system.structure.moves, max(displacement, rotation) / 2
     largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
     resolved = tips > RESOLVED * largest  # more than round-off of displacements or of rotations
     small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
@@ -198,7 +198,7 @@ def _tip(system: Any, x: Array) -> Array:
 
 def _sizes(system: Any, q: Array) -> tuple[float, float]:
     """Return the size of displacements over L, and the largest rotation component (rad)."""
-    sizes, moves = np.asarray(system.sizes(q)), np.array(system.structure.moves)
+    sizes, moves = np.asarray(system.sizes(q)), system.structure.moves
     return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
 
 

@@ -158,7 +158,7 @@ def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:
     max_φ |Re(u e^{iφ})|² = ½(|u|² + |u·u|), with u·u e^{2iφ} real. Of a mode whose kinetic energy is for the most part
     that of rotations, it is the largest rotation times the length of the structure.
     """
-    moves = np.array(analysis.structure.moves)
+    moves = analysis.structure.moves
     out, right, turned = [], spinning.pairs.right, analysis.described(spinning).rotary > 0.5
     for i in range(right.shape[1]):
         values = analysis.structure.nodes(right[:, i])[1]

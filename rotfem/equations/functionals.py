@@ -77,8 +77,8 @@ class Functionals:
         """Return their values over all ranks, at what their forms are evaluated at."""
         if not self.names:
             return {}
-        self._of_cells[:] = 0.0
-        fem.assemble_vector(self._of_cells.reshape(-1), self._form)
+        self._of_cells.fill(0.0)
+        forms.add_vector(self._of_cells.reshape(-1), self._form)
         values = self._of_cells.sum(axis=0)
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)

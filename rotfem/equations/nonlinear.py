@@ -118,6 +118,7 @@ class NonlinearSystem(System):
     def _compile(self) -> Any:
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
+        self._shift_entries = [constant.value for constant in self._shifts]  # where they are
         self._spin: Any = None
         self._signs = np.full_like(self._b_array, -1.0)
         self._signs[self.clamped] = 0.0
@@ -269,8 +270,8 @@ class NonlinearSystem(System):
     def shift(self, shifts: tuple[float, ...]) -> None:
         """Set the factors of K, C and M in the form J."""
         if self._shift_values != [*shifts]:
-            for constant, value in zip(self._shifts, shifts, strict=True):
-                constant.value = value
+            for entry, value in zip(self._shift_entries, shifts, strict=True):
+                entry[()] = value
             self._shift_values[:] = shifts
 
     def _terms(self, shifts: tuple[float, float, float]) -> list[Any]:

@@ -68,6 +68,7 @@ class System(Solutions, ABC):
             of its own.
         analysed: a solver with a symmetric matrix of the pattern, of which others can use the ordering; None at first.
         left_out: effects that are switched off.
+        by_mode: the part of C that is damping by mode; None without, and where damping is left out.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
 
@@ -101,10 +102,9 @@ class System(Solutions, ABC):
         self.b = compat.wrap(self._b)
         self._solver: DirectSolver | None = None
         self._dx = Increment(self.V)
-        self._by_mode: ByMode | None = None
-        self._damped = True
+        self.by_mode: ByMode | None = None
         self.A = self._compile()
-        self._by_mode = damping_by_mode(self)
+        self._by_mode = self.by_mode = damping_by_mode(self)
         #: Whether a factor is kept for the steps that follow, where factorising is dear: soon of a plate's matrix.
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
@@ -196,16 +196,11 @@ class System(Solutions, ABC):
         """Switch effects off, all others on; of twins each has its own switched off."""
         self.left_out = frozenset(effects)
         self.model.switch_off(self.left_out)
-        self._damped = EFFECT not in effects
+        self.by_mode = None if EFFECT in effects else self._by_mode
 
     @cached_property
     def _spun(self) -> Any:
         return compat.create_vector(self.V)
-
-    @property
-    def by_mode(self) -> ByMode | None:
-        """The part of C that is damping by mode; None without, and where damping is left out."""
-        return self._by_mode if self._damped else None
 
     def with_modes(self, A: Any, c_v: float) -> Any:
         """Return A + c_v times the part of C that is damping by mode, of an A with c_v times all else in C."""
@@ -343,9 +338,7 @@ class System(Solutions, ABC):
         here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
         return here if self.comm.size == 1 else self.comm.allreduce(here)
 
-    def increment_size(self, dq: Array) -> float:
-        """Return the size of a correction by which Newton is judged."""
-        return self.size(dq)
+    increment_size = size  # of a correction by which Newton is judged; a hub's angle is among the unknowns then
 
     def sizes(self, x: Array) -> Array:
         """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""

@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse
 from dolfinx import geometry
+from mpi4py import MPI
+from petsc4py import PETSc
 
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
@@ -119,7 +121,16 @@ def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
     further = len(of.zeros()) - len(here.zeros())  # the angle of a free hub
     carrying = scipy.sparse.kron(weights, np.eye(here.structure.size))
     carrying = scipy.sparse.block_diag((carrying, np.eye(further))).tocsr() if further else carrying.tocsr()
-    return lambda q: np.asarray(carrying @ q)
+    csr = (carrying.indptr, carrying.indices, carrying.data)
+    A = PETSc.Mat().createAIJ(carrying.shape, csr=csr, comm=MPI.COMM_SELF)  # its products begin sooner than SciPy's
+    known, found = A.createVecs()
+
+    def carried(q: Array) -> Array:
+        known.array[:] = q
+        A.mult(known, found)
+        return np.array(found.array)
+
+    return carried
 
 
 def interpolation(V: Any, points: Array) -> Any:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
-from math import sqrt
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -259,10 +259,10 @@ class Companion:
 
     def _compare(self, here: State, there: State) -> None:
         """Take note of the distance of the outputs at an instant."""
-        apart = self.output(self.system, here) - self.output(self.followed, there)
-        size = sqrt(apart @ apart)
+        apart: Any = (self.output(self.system, here) - self.output(self.followed, there)).tolist()
+        size = hypot(*apart)
         self.sound &= size <= self.limit  # not where it is no number
-        self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
+        self.components = tuple(max(a, abs(b)) for a, b in zip(self.components, apart, strict=True))
         if size > self.difference[0]:
             self.difference = size, there.t
             least = self.part * size / self.system.structure.length

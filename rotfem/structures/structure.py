@@ -190,9 +190,9 @@ class Structure:
         return False
 
     @cached_property
-    def moves(self) -> list[bool]:
+    def moves(self) -> npt.NDArray[np.bool_]:
         """Of every component whether it is a displacement; the others are rotations."""
-        return [name.startswith("u") for name in self.components]
+        return np.array([name.startswith("u") for name in self.components])
 
     @property
     def unknowns(self) -> tuple[str, ...]:
