@@ -148,7 +148,8 @@ class March:
 #: Safety factor, and smallest change of a step.
 SAFETY, SHRINK = 0.9, 0.2
 
-#: The longest step, and the cells of the time grid, as parts of the end.
+#: The longest step, and the intervals over which many knots are averaged, as parts of the end. A history is seldom
+#: drawn with more than 2000 points: what changes faster has the same impulse and first moment in every interval.
 LONGEST, CELL = 0.05, 5e-4
 
 #: Steps, with those taken back, after which a march is given up; steps over which its pace is measured.

@@ -4,7 +4,8 @@ A companion is one more march on a system of its own. It takes two steps of the 
 nothing prescribed lies between them, or the same ones as another companion; so it meets the same instants. Its first
 guess of a step is the motion that it follows plus the difference so far: mostly one Newton iteration is left to do.
 
-Differences become errors by an order (see `rotfem.refinement.estimate`): that of elements, or that of the scheme.
+Differences become errors by an order (see `rotfem.refinement.estimate`): that of elements, or that of the scheme up to
+`CERTAIN`. Of schemes of higher order the difference itself is the error.
 """
 
 from __future__ import annotations

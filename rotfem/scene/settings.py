@@ -244,7 +244,8 @@ class Time(SceneModel):
         max_step: longest adaptive step (s); `end`/20 if not given.
         min_step: shortest adaptive step (s); 1e-9 `end` if not given.
         scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
-        breakpoints: times (s) at which a function of time jumps or has a kink; steps end there.
+        breakpoints: times (s) at which a function of time jumps or has a kink. Steps of order above 2 end there, others
+            see the straight line of the same impulse and first moment.
         output_every: number of steps from one output to the next.
         output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
     """

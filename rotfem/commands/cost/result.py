@@ -151,7 +151,10 @@ class CostResult(Rows):
         return sorted((row for row in self.rows if row["pareto"]), key=lambda row: float(row["cost"]))
 
     def recommend(self, accuracy: float) -> Row | None:
-        """Return the cheapest row within a relative accuracy, uncertainty included; None if there is none."""
+        """Return the row of least `cost` (CPU time with set-up, s) of those within a relative accuracy; None without.
+
+        What counts is `total_error` with the uncertainty of the reference.
+        """
         known = self.summary["uncertainty"]
         return None if known is None else recommend(self.rows, accuracy, known)
 
