@@ -54,7 +54,7 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
 
 
 def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
-    """Return cells of a plate as a scene has them, but 24 nodes along the longer edge, and three across if there are."""
+    """Return cells of a plate like those of a scene: 24 nodes along the longer edge, and three across if there are."""
     growth = min(1.0, 24 / degree / max(elements))
     x, y = (max(math.ceil(n * growth), min(n, 3)) for n in elements)
     return x, y
