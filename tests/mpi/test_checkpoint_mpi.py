@@ -70,7 +70,7 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path
     return folder
 
 
-@pytest.mark.parametrize(("text", "ranks"), [(BEAM, 2), (PLATE, 2), (PLATE, 3)], ids=["beam", "plate", "plate, three"])
+@pytest.mark.parametrize(("text", "ranks"), [(BEAM, 2), (PLATE, 3)], ids=["beam", "plate"])
 def test_processes_that_share_a_mesh_go_on(
     tmp_path: Path, begun: Callable[[str, int], Path], text: str, ranks: int
 ) -> None:
@@ -95,12 +95,12 @@ def test_processes_that_share_a_mesh_go_on(
             np.testing.assert_allclose(cut[column][again], values[order], rtol=0, atol=1e-9 * scale, err_msg=column)
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_another_number_of_processes_is_refused(tmp_path: Path, begun: Callable[[str, int], Path], ranks: int) -> None:
-    shutil.copytree(begun(PLATE, 2), tmp_path, dirs_exist_ok=True)
+    shutil.copytree(begun(PLATE, 3), tmp_path, dirs_exist_ok=True)
     done = rotfem(tmp_path, ranks, *COMMAND, "-o", "cut", "--resume")
     assert done.returncode == 2
-    assert f"is of a mesh that 2 processes share, and here are {ranks}: go on with as many" in done.stderr
+    assert f"is of a mesh that 3 processes share, and here are {ranks}: go on with as many" in done.stderr
 
 
 RANK = "$OMPI_COMM_WORLD_RANK"
