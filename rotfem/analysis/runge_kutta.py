@@ -109,9 +109,11 @@ W = np.linalg.inv(A)
 _EIGENVALUES, _VECTORS = np.linalg.eig(W)
 _FIRST = [int(np.argmin(np.abs(_EIGENVALUES.imag))), int(np.argmax(_EIGENVALUES.imag))]
 
-#: The real eigenvalue and the one above the axis, with their columns of T and rows of T⁻¹.
+#: The real eigenvalue and the one above the axis, with their rows of T⁻¹; and the way back to the stages, of the real
+#: part, and of the real and the imaginary part of the one above the axis.
 REAL, ABOVE = float(_EIGENVALUES[_FIRST[0]].real), complex(_EIGENVALUES[_FIRST[1]])
-COLUMNS, ROWS = _VECTORS[:, _FIRST], np.linalg.inv(_VECTORS)[_FIRST]
+ROWS, (_REAL, _ABOVE) = np.linalg.inv(_VECTORS)[_FIRST], _VECTORS[:, _FIRST].T
+BACK = np.stack([_REAL.real, 2 * _ABOVE.real, -2 * _ABOVE.imag], axis=1)
 
 #: Iterations before a solution is given up.
 MOST = 10
@@ -142,25 +144,23 @@ class Together(list[Stage]):
 
     def __init__(self, stages: Sequence[Stage], h: float):
         super().__init__(stages)
-        self.rates = (np.eye(len(stages)), W / h, W @ W / h**2)
-        self.arrays = tuple(np.array([getattr(s, name) for s in stages]) for name in "qva")
+        self.rates = np.concatenate((np.eye(len(stages)), W / h, W @ W / h**2))
+        self.arrays = np.array([[getattr(s, name) for s in stages] for name in "qva"])
         for i, stage in enumerate(self):
-            stage.q, stage.v, stage.a = (x[i] for x in self.arrays)
-        self.start: tuple[Array, ...] = ()
+            stage.q, stage.v, stage.a = self.arrays[:, i]
+        self.start = self.arrays
 
     def correct(self, dq: Array) -> None:
         """Change q by dq (3, …), and the rates by what follows from it."""
-        for x, rate in zip(self.arrays, self.rates, strict=True):
-            x += rate @ dq
+        self.arrays += self.rates.dot(dq).reshape(self.arrays.shape)
 
     def begin(self) -> None:
         """Take note of where iterations start."""
-        self.start = tuple(x.copy() for x in self.arrays)
+        self.start = self.arrays.copy()
 
     def go_back(self) -> None:
         """Go back to where they started."""
-        for x, start in zip(self.arrays, self.start, strict=True):
-            x[:] = start
+        self.arrays[:] = self.start
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ def iterate(stages: Together, h: float, equations: Equations, linearised: Any, l
     for k in range(1, MOST + 1):
         residuals = np.array([equations.imbalance(s) for s in stages])
         real, above = linearised.solve(ROWS[0].real @ residuals, ROWS[1] @ residuals)
-        dq = np.outer(COLUMNS[:, 0].real, real) + 2 * np.outer(COLUMNS[:, 1], above).real
+        dq = BACK.dot(np.array((real, above.real, above.imag)))
         stages.correct(dq)
         newton.iterations += 1
         size = float(equations.system.increment_size(np.abs(dq).max(axis=0)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection
 from copy import copy
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -89,6 +89,8 @@ class System(Solutions, ABC):
         self.comm, self.shared = model.comm, model.comm.size > 1
         self.q, self.v, self.a, _ = self.structure.k.functions
         self.V = self.structure.V
+        #: Values of the frame's constants at the last few times, as iterations and companions come back to them.
+        self._frame_at = lru_cache(maxsize=8)(lambda t, *_: self.model.frame.values(self.motion, t))
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
         self.assembled = 0.0
@@ -239,7 +241,10 @@ class System(Solutions, ABC):
         plain, motion = motion is None and load_factor == 1.0, motion or self.motion
         self.model.time, self.model.shown = t, (t, self.view.side, self.view.line, self.left_out) if plain else None
         self.model.switch_off(self.left_out)
-        values = self.model.frame.values(motion, t)
+        if plain and self.model.hub is None:
+            values = self._frame_at(t, self.view.side, self.view.line, len(self.model.frame.constants))
+        else:
+            values = self.model.frame.values(motion, t)
         if load_factor != 1.0:
             values = {n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()}
         self.model.frame.set(values)
