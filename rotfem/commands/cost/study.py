@@ -285,14 +285,17 @@ class Study:
     def _paired(self, setting: Setting) -> tuple[Array, dict[str, float | None]]:
         """Return the output of a setting, and its errors by its differences from those of coarser ones.
 
-        Unknown is what another tolerance, or cells that knots fix, do not change.
+        Unknown is that of steps which another tolerance does not change, and that of a mesh with cells that required
+        nodes fix.
         """
-        coarser = {name: self._computed(other) for name, other in setting.coarser().items()}
+        coarser = {name: (other, self._computed(other)) for name, other in setting.coarser().items()}
         here, error = self._computed(setting), dict[str, float | None]()
         for name in ("time", "space") if setting.moving else ("space",):
-            there, error[name] = coarser.get(name), None
-            if there is not None and (here.dofs, here.steps) != (there.dofs, there.steps):
-                ratio = here.steps / there.steps if name == "time" else RATIO
+            error[name] = None
+            if name in coarser:
+                other, there = coarser[name]
+                fewer = there.dofs * setting.unknowns() <= here.dofs * other.unknowns()
+                ratio = here.steps / there.steps if name == "time" else RATIO if fewer else 1.0
                 if ratio > 1.0:
                     error[name] = self.apart(here.values, there.values) / min(1.0, ratio**2 - 1.0)
         known = [part for part in error.values() if part is not None]
