@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from rotfem.analysis.load_steps import Growth, balance, check_inside_out, recounted
+from rotfem.analysis.load_steps import LoadFactors, balance, check_inside_out, recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
 from rotfem.numerics.newton import Newton
@@ -80,7 +80,7 @@ class Tracer:
         newton: tolerance of the corrections; their count is added to.
     """
 
-    def __init__(self, system: Any, growth: Growth, newton: Newton):
+    def __init__(self, system: Any, growth: LoadFactors, newton: Newton):
         self.system, self.growth, self.newton = system, growth, newton
         self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
         self._y, self._z = Increment(system.V), Increment(system.V)

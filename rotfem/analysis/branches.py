@@ -49,7 +49,7 @@ SURE, AMBIGUOUS = 0.9, 0.5
 
 
 #: Relative distance of eigenvalues below which they are taken for one, as those of a disk at rest.
-TWIN = 1e-6
+REPEATED = 1e-6
 
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
@@ -57,13 +57,13 @@ SPARE = 3
 
 
 @dataclass
-class Node:
+class SpeedPoint:
     """Modes at one speed of a sweep; `order[b]` is the column of branch b, −1 where it was lost.
 
     Attributes:
         requested: whether the speed was asked for (else it refines a step).
-        confidence: squared correlation with the previous node, a branch each.
-        conjugate: of which branches it is λ̄ that goes on with what λ was at the first node: ω has passed zero.
+        confidence: squared correlation with the previous point, a branch each.
+        conjugate: of which branches it is λ̄ that goes on with what λ was at the first point: ω has passed zero.
     """
 
     spinning: Spinning
@@ -107,7 +107,7 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
     single = np.abs(here) * np.abs(there.T) / scale
     joint = single.copy()
-    groups_a, groups_b = twins(la, a.pairs.bounds), twins(lb, b.pairs.bounds)
+    groups_a, groups_b = repeated(la, a.pairs.bounds), repeated(lb, b.pairs.bounds)
     if len(groups_a) == len(la) and len(groups_b) == len(lb):
         return joint, single
     for i in groups_a:
@@ -119,46 +119,46 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     return joint, single
 
 
-def twins(values: Array, bounds: Array) -> list[list[int]]:
+def repeated(values: Array, bounds: Array) -> list[list[int]]:
     """Return the indices of eigenvalues (sorted by size) in groups of those that are one.
 
     Args:
         values: the eigenvalues, 1/s.
-        bounds: their relative error bounds; what is no farther apart than these, or TWIN, is one.
+        bounds: their relative error bounds; what is no farther apart than these, or REPEATED, is one.
     """
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(TWIN, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(REPEATED, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
     out = [[0]] if len(values) else []
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])
     return out
 
 
-def assign(node: Node, following: Node) -> float:
-    """Join the branches of a node with the columns of the following one; return the least squared correlation.
+def assign(point: SpeedPoint, following: SpeedPoint) -> float:
+    """Join the branches of a point with the columns of the following one; return the least squared correlation.
 
     A branch whose best partner is a stranger has the order −1 from there on.
     """
-    known = np.flatnonzero(node.order >= 0)
+    known = np.flatnonzero(point.order >= 0)
 
     def likeness(conjugate: bool) -> list[Array]:
         return [
-            np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning, conjugate)
+            np.clip(x[point.order[known]], 0.0, 1.0) for x in correlation(point.spinning, following.spinning, conjugate)
         ]
 
     c, single = likeness(False)
-    a, b = node.spinning.pairs.values[node.order[known]], following.spinning.pairs.values
+    a, b = point.spinning.pairs.values[point.order[known]], following.spinning.pairs.values
     # |dω/dΩ| in the rotor of a mode whose ω passes zero is at most 3: 1 of the frame, and at most 2 of gyroscopic
     # moments, as the polar moment of inertia of a body is at most twice its diametral one.
-    may_pass = a.imag[:, None] + b.imag[None, :] <= 3.0 * abs(following.speed - node.speed)
+    may_pass = a.imag[:, None] + b.imag[None, :] <= 3.0 * abs(following.speed - point.speed)
     passed = np.zeros_like(may_pass)
     if np.any(may_pass):
         c_bar, single_bar = likeness(True)
         passed = may_pass & (c_bar > c)
         c, single = np.where(passed, c_bar, c), np.where(passed, single_bar, single)
     rows, columns = linear_sum_assignment(-c - 1e-3 * single)
-    following.order = np.full(len(node.order), -1)
-    following.confidence = np.zeros(len(node.order))
-    following.conjugate = node.conjugate.copy()
+    following.order = np.full(len(point.order), -1)
+    following.confidence = np.zeros(len(point.order))
+    following.conjugate = point.conjugate.copy()
     following.conjugate[known[rows]] ^= passed[rows, columns]
     following.confidence[known[rows]] = c[rows, columns]
     kin = c[rows, columns] >= 0.02  # else they have nothing in common, and the branch is lost
@@ -166,8 +166,8 @@ def assign(node: Node, following: Node) -> float:
     return float(np.min(c[rows, columns], initial=1.0))
 
 
-def swapped(a: Node, b: Node, count: int) -> bool:
-    """Return whether one of the first branches changes its order by frequency with another between two nodes."""
+def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
+    """Return whether one of the first branches changes its order by frequency with another between two points."""
     both = np.flatnonzero((a.order >= 0) & (b.order >= 0))
     wa, wb = (n.spinning.pairs.values[n.order[both]].imag for n in (a, b))
     da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
@@ -193,15 +193,15 @@ class Sweep:
         self.analysis, self.count = analysis, count
         self.known: dict[float, Spinning] = {}
         self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
-        self.nodes: list[Node] = []
+        self.points: list[SpeedPoint] = []
         self.solves, self.most_solves, self.unresolved = 0, most, False
         self.ambiguous: list[dict[str, float]] = []
 
-    def solve(self, speed: float, start: Spinning | None, requested: bool) -> Node:
+    def solve(self, speed: float, start: Spinning | None, requested: bool) -> SpeedPoint:
         """Return the modes at a speed, its equilibrium continued from start."""
         self.solves += 1
         known = self.known.pop(speed, None)
-        return Node(known or self.analysis.at(speed, self.count + SPARE, start), requested)
+        return SpeedPoint(known or self.analysis.at(speed, self.count + SPARE, start), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds."""
@@ -209,16 +209,16 @@ class Sweep:
         total = len(first.spinning.pairs.values)
         first.order, first.confidence = np.arange(total), np.ones(total)
         first.conjugate = np.zeros(total, dtype=bool)
-        self.nodes = [first]
+        self.points = [first]
         self.finest = 1e-5 * max(speeds[-1] - speeds[0], 1e-300)  # a narrower veering passes as a crossing
         self.most_solves = min(self.most_solves, 1000 + 41 * len(speeds))  # a veering takes 17
         for i, speed in enumerate(speeds[1:], start=1):
-            self._advance(self.solve(speed, self.nodes[-1].spinning, True))
+            self._advance(self.solve(speed, self.points[-1].spinning, True))
             progress(i / (len(speeds) - 1))
 
-    def _advance(self, target: Node) -> None:
-        """Append a node, and nodes before it as long as the step is not sure."""
-        last = self.nodes[-1]
+    def _advance(self, target: SpeedPoint) -> None:
+        """Append a point, and points before it as long as the step is not sure."""
+        last = self.points[-1]
         confidence = assign(last, target)
         near = self._watched(last, target)
         if (confidence < SURE and near) or swapped(last, target, self.count):
@@ -232,29 +232,29 @@ class Sweep:
             self.ambiguous += [
                 {"branch": b + 1, "speed": target.speed, "confidence": float(target.confidence[b])} for b in weak
             ]
-        self.nodes.append(target)
+        self.points.append(target)
 
-    def _watched(self, last: Node, target: Node) -> bool:
+    def _watched(self, last: SpeedPoint, target: SpeedPoint) -> bool:
         """Return whether a branch that is asked for (not only a spare one) is unsure."""
         return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
 
     # --- what the diagram says ----------------------------------------------------------------------------------------
 
-    def between(self, left: Node, speed: float) -> Node:
-        """Return the modes at a speed to the right of a node, joined with its branches."""
-        node = self.solve(speed, left.spinning, False)
-        assign(left, node)
-        return node
+    def between(self, left: SpeedPoint, speed: float) -> SpeedPoint:
+        """Return the modes at a speed to the right of a point, joined with its branches."""
+        point = self.solve(speed, left.spinning, False)
+        assign(left, point)
+        return point
 
-    def wave(self, node: Node, branch: int) -> Wave | None:
-        """Return how the mode of a branch precesses at a node; None where it is lost or no rotor's."""
-        waves = self.analysis.described(node.spinning).waves
-        return waves[node.order[branch]] if waves and node.order[branch] >= 0 else None
+    def wave(self, point: SpeedPoint, branch: int) -> Wave | None:
+        """Return how the mode of a branch precesses at a point; None where it is lost or no rotor's."""
+        waves = self.analysis.described(point.spinning).waves
+        return waves[point.order[branch]] if waves and point.order[branch] >= 0 else None
 
-    def direction(self, node: Node, branch: int) -> str:
-        """Return "forward" or "backward", how a branch whirls at a node; "" where it stands or is no rotor's."""
-        wave = self.wave(node, branch)
-        return "" if wave is None else wave.direction(node.value(branch).imag, abs(node.speed))
+    def direction(self, point: SpeedPoint, branch: int) -> str:
+        """Return "forward" or "backward", how a branch whirls at a point; "" where it stands or is no rotor's."""
+        wave = self.wave(point, branch)
+        return "" if wave is None else wave.direction(point.value(branch).imag, abs(point.speed))
 
     def critical_speeds(self, orders: Collection[int]) -> list[dict[str, Any]]:
         """Return the critical speeds of the branches: the synchronous ones of a rotor first, each kind by speed.
@@ -268,7 +268,7 @@ class Sweep:
         Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
         """
         wanted, out = list[tuple[int, int, int | None]](), []
-        for i, (left, right) in enumerate(pairwise(self.nodes)):
+        for i, (left, right) in enumerate(pairwise(self.points)):
             for b in range(self.count):
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
@@ -278,7 +278,7 @@ class Sweep:
             self.solves += solves
             if speed is None:
                 continue
-            left, right = self.nodes[i : i + 2]
+            left, right = self.points[i : i + 2]
             wave = self.wave(left if k is None else right, b)
             way = self.direction(right, b)
             if k is None:
@@ -296,34 +296,34 @@ class Sweep:
         return {"speed": speed, **named, "branch": branch + 1, "frequency": frequency}
 
     @staticmethod
-    def _gap(node: Node, b: int, k: int | None) -> float:
-        """Return how far a branch is above the line kΩ at a node, or without k above zero, rad/s."""
-        return node.signed(b) if k is None else node.value(b).imag - k * abs(node.speed)
+    def _gap(point: SpeedPoint, b: int, k: int | None) -> float:
+        """Return how far a branch is above the line kΩ at a point, or without k above zero, rad/s."""
+        return point.signed(b) if k is None else point.value(b).imag - k * abs(point.speed)
 
-    def _between(self, left: Node, right: Node, b: int, k: int | None) -> bool:
-        """Return whether a branch has the frequency kΩ, or passes zero without k, between two nodes."""
-        ends = [self._gap(node, b, k) for node in (left, right)]
+    def _between(self, left: SpeedPoint, right: SpeedPoint, b: int, k: int | None) -> bool:
+        """Return whether a branch has the frequency kΩ, or passes zero without k, between two points."""
+        ends = [self._gap(point, b, k) for point in (left, right)]
         return bool(np.all(np.isfinite(ends)) and ends[0] != 0.0 and ends[0] * ends[1] <= 0.0)
 
     def _meeting(self, place: tuple[int, int, int | None]) -> tuple[float | None, int]:
-        """Return the speed after the node i where a branch b has the frequency kΩ, or None, and solutions it took."""
+        """Return the speed after the point i where a branch b has the frequency kΩ, or None, and solutions it took."""
         i, b, k = place
-        left, right = self.nodes[i : i + 2]
+        left, right = self.points[i : i + 2]
         before, self.solves = self.solves, 0
         met = list[bool]()  # whether the frequency is on the line to its error bound; twice, then round-off is followed
 
         def f(speed: float) -> float:
             try:
-                node = self.between(left, speed)
+                point = self.between(left, speed)
             except ComputationError:
                 if k is None:
                     return 0.0  # K is singular: this is the speed
                 raise
-            gap, pairs, j = self._gap(node, b, k), node.spinning.pairs, node.order[b]
+            gap, pairs, j = self._gap(point, b, k), point.spinning.pairs, point.order[b]
             met.append(k is not None and abs(gap) <= pairs.bounds[j] * abs(pairs.values[j]))
             return 0.0 if sum(met) == 2 else gap
 
-        ends = [self._gap(node, b, k) for node in (left, right)]
+        ends = [self._gap(point, b, k) for point in (left, right)]
         speed = right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)
         taken, self.solves = self.solves, before
         return speed, taken
@@ -334,17 +334,17 @@ class Sweep:
         A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it. One in
         which no growth is above the error bound of its mode is none.
         """
-        sure = [node.speed for node in self.nodes if unstable(node.spinning) is not None]
+        sure = [point.speed for point in self.points if unstable(point.spinning) is not None]
         if not sure:
             return []
-        kinds = [unstable(node.spinning, bounded=False) for node in self.nodes]
+        kinds = [unstable(point.spinning, bounded=False) for point in self.points]
         out: list[dict[str, Any]] = []
         if kinds[0] is not None:
-            out.append({"speed": self.nodes[0].speed, "kind": kinds[0], "until": None})
+            out.append({"speed": self.points[0].speed, "kind": kinds[0], "until": None})
         for i, (before, after) in enumerate(pairwise(kinds)):
             if before == after:
                 continue
-            speed = self._bisect(self.nodes[i], self.nodes[i + 1], before, after)
+            speed = self._bisect(self.points[i], self.points[i + 1], before, after)
             if speed is None:
                 continue
             if before is not None and out:
@@ -354,7 +354,7 @@ class Sweep:
         ends = [np.inf if r["until"] is None else r["until"] for r in out]
         return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
 
-    def _bisect(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
+    def _bisect(self, left: SpeedPoint, right: SpeedPoint, before: str | None, after: str | None) -> float | None:
         """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
         low, high = left.spinning, right.speed
         while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.analysis.load_steps import (
     SMALLEST_SHARE,
-    Growth,
+    LoadFactors,
     Raised,
     balance,
     check_inside_out,
@@ -61,7 +61,7 @@ def steady_state(
         ComputationError: no equilibrium was reached; says how far the load got.
     """
     notes = [] if notes is None else notes
-    system, growth = system.held, Growth(omega)
+    system, growth = system.held, LoadFactors(omega)
     loose = [hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0]
     if start is not None:
         try:
@@ -100,7 +100,7 @@ def _compliance_lost(system: Any, omega: float) -> bool:
         return False
 
 
-def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> Array:
+def _grown(system: Any, growth: LoadFactors, newton: Newton, past_limits: bool, notes: list[str]) -> Array:
     """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory.
 
     It is the one that is found first unless Newton left the path, or past maxima of the load its end.
@@ -150,7 +150,7 @@ def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes
     return balance(system, growth, 1.0, found.q, newton)
 
 
-def _path(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath:
+def _path(system: Any, growth: LoadFactors, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath:
     """Return the path and note what there is on it."""
     try:
         path = Tracer(system, growth, newton).follow(past_limits)

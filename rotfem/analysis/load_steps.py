@@ -60,7 +60,7 @@ class Raised:
 
 
 @dataclass(frozen=True)
-class Growth:
+class LoadFactors:
     """What grows on the way to an equilibrium: with its share s the square of the speed and the loads, linearly.
 
     A hinge has no stiffness before the spin is there: then it grows first, and the loads at the full speed.
@@ -108,7 +108,7 @@ class Growth:
         return f"{share:.6g} of the load{speed}"
 
 
-def raised(system: System, growth: Growth, newton: Newton) -> Raised:
+def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     """Return the equilibrium at full load, in one step or by halved ones.
 
     Where there are several equilibria, a way that wanders may end at any of them. Then smaller steps are taken, whose
@@ -160,7 +160,7 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
     return Raised(np.asarray(q), reference)
 
 
-def on_hinges(system: System, omega: float, newton: Newton) -> Growth:
+def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
     """Return how the load of a structure grows whose root is free to turn: from an equilibrium that holds its hinges.
 
     At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes, and of loads where
@@ -181,28 +181,28 @@ def on_hinges(system: System, omega: float, newton: Newton) -> Growth:
     def between(first: float, last: float) -> tuple[tuple[Any, float, float], ...]:
         return tuple((k, max(own, first), max(own, last)) for k, own in zip(springs, given, strict=True))
 
-    q = Growth(0.0).begin(system)
-    Growth(0.0).set(system, 0.0)
+    q = LoadFactors(0.0).begin(system)
+    LoadFactors(0.0).set(system, 0.0)
     system.set_state(q)
     stiff = float(
         system.tangent(1.0, 0.0, 0.0)[0].norm(norm_type=3)
     )  # the largest sum of a row: far above that of a turn
     try:
-        start = raised(system, Growth(omega, load=(0.0, load), springs=between(stiff, stiff)), newton)
+        start = raised(system, LoadFactors(omega, load=(0.0, load), springs=between(stiff, stiff)), newton)
         turn = float(
             system.comm.allreduce(np.max(np.abs(start.q[system.structure.hinged_unknowns()]), initial=0.0), MPI.MAX)
         )
         soft = min(1.0, turn / 0.1) * stiff  # which lets the root swing by 0.1 rad when they let go
-        start = raised(system, Growth(omega, (1.0, 1.0), (load, load), between(soft, 0.0), start), newton)
+        start = raised(system, LoadFactors(omega, (1.0, 1.0), (load, load), between(soft, 0.0), start), newton)
     except ComputationError:
-        return Growth(omega)
+        return LoadFactors(omega)
     finally:
         for constant, own in zip(springs, given, strict=True):
             constant.value = own
-    return Growth(omega, (1.0, 1.0), (load, 1.0), start=start)
+    return LoadFactors(omega, (1.0, 1.0), (load, 1.0), start=start)
 
 
-def counted(system: System, growth: Growth, share: float, q: Array, newton: Newton) -> Array:
+def counted(system: System, growth: LoadFactors, share: float, q: Array, newton: Newton) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again.
 
     Raises:
@@ -217,7 +217,7 @@ def counted(system: System, growth: Growth, share: float, q: Array, newton: Newt
 
 
 def balance(
-    system: System, growth: Growth, share: float, guess: Array, newton: Newton, *, checked: bool = True
+    system: System, growth: LoadFactors, share: float, guess: Array, newton: Newton, *, checked: bool = True
 ) -> Array:
     """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads.
 

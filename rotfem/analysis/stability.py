@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rotfem.analysis.equilibrium import gravity_turns
-from rotfem.analysis.load_steps import Growth, balance
+from rotfem.analysis.load_steps import LoadFactors, balance
 from rotfem.analysis.modal import GROWTH
 from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
@@ -240,7 +240,7 @@ def constant_stability(system: Any, newton: Newton) -> Stability | None:
         return None
     system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
     try:
-        q = balance(system, Growth(speed), 1.0, system.zeros(), newton, checked=False)
+        q = balance(system, LoadFactors(speed), 1.0, system.zeros(), newton, checked=False)
         return stability_of(system, q, speed)
     except ComputationError:
         return None

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.branches import SPARE, Node, Sweep
+from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import in_basis
 from rotfem.commands.error_report import error_of_modes
@@ -147,8 +147,8 @@ def diagram(
     if reduced is not None:
         sweep.known = dict(zip(values, reduced.at_all(values, count + SPARE), strict=True))
     sweep.run(values, progress or (lambda share: None))
-    sweep.count = count = min(count, len(sweep.nodes[0].order))
-    found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
+    sweep.count = count = min(count, len(sweep.points[0].order))
+    found = [point.value(b).imag for point in sweep.points for b in range(count)]
     lowest = min((w for w in found if w > 0), default=0.0)
     orders = marks.orders
     if orders is None:
@@ -156,14 +156,14 @@ def diagram(
         orders = tuple(range(1, most + 1))
     labels = branch_labels(analysis, sweep, count)
     mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
-    rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
+    rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
     crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
     for crossing in crossings:
         label = labels[crossing["branch"] - 1]
         crossing |= {"label": label, "name": engineers_name(label)}
-    last = sweep.nodes[-1].spinning.first(count)
-    of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
+    last = sweep.points[-1].spinning.first(count)
+    of_last = {} if mesh is None else dict(zip(sweep.points[-1].order, mesh, strict=False))
     known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
     off = theory_error(analysis, last)
     warnings = [
@@ -179,9 +179,9 @@ def diagram(
                 "branch": b + 1,
                 "label": labels[b],
                 "name": engineers_name(labels[b]),
-                "confidence": min(float(node.confidence[b]) for node in sweep.nodes),
-                "frequency_first": _finite(sweep.nodes[0].value(b).imag),
-                "frequency_last": _finite(sweep.nodes[-1].value(b).imag),
+                "confidence": min(float(point.confidence[b]) for point in sweep.points),
+                "frequency_first": _finite(sweep.points[0].value(b).imag),
+                "frequency_last": _finite(sweep.points[-1].value(b).imag),
             }
             for b in range(count)
         ],
@@ -195,7 +195,7 @@ def diagram(
         "speeds": len(values),
         "speeds_solved": sweep.solves,
         **({"error": error_of_modes(rows, off).summary()} if scene.output.error else {}),
-        "checks": self_checks(analysis, sweep.nodes[-1].spinning),
+        "checks": self_checks(analysis, sweep.points[-1].spinning),
         **analysis.report(),
         "lowest_frequency": lowest,
         "warnings": warnings,
@@ -228,7 +228,7 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
         onsets: ranges of instability.
         ends: rows of the modes at the last speed.
     """
-    last = sweep.nodes[-1]
+    last = sweep.points[-1]
     lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
     out = []
     if sweep.unresolved:
@@ -252,13 +252,13 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
 def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:
     """Return the names of the branches: of their modes at the first speed, of a rotor where most of them precess."""
 
-    def precessing(node: Node) -> tuple[int, int]:
-        there = [b for b in range(count) if node.order[b] >= 0]
-        return len(there), sum(sweep.direction(node, b) != "" for b in there)
+    def precessing(point: SpeedPoint) -> tuple[int, int]:
+        there = [b for b in range(count) if point.order[b] >= 0]
+        return len(there), sum(sweep.direction(point, b) != "" for b in there)
 
-    node = max(sweep.nodes, key=precessing)  # the first of several
-    names = analysis.described(node.spinning).names
-    return distinct([names[node.order[b]] for b in range(count)])
+    point = max(sweep.points, key=precessing)  # the first of several
+    names = analysis.described(point.spinning).names
+    return distinct([names[point.order[b]] for b in range(count)])
 
 
 def _finite(value: float) -> float | None:
@@ -269,42 +269,42 @@ def _finite(value: float) -> float | None:
 def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
     """Return the relative error of each branch by the mesh, the larger one of those at both ends of the diagram."""
     errors, found = FrequencyErrors(analysis), list[list[float]]()
-    for node in (sweep.nodes[0], sweep.nodes[-1]):
-        order = [int(i) for i in node.order[:count]]
+    for point in (sweep.points[0], sweep.points[-1]):
+        order = [int(i) for i in point.order[:count]]
         # What the mesh does to modes far above would be taken for errors of these.
-        there = errors(node.spinning.first(1 + max(order)))
+        there = errors(point.spinning.first(1 + max(order)))
         found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
     return list(map(_finite, np.fmax(*np.array(found))))
 
 
-def node_rows(
-    analysis: ModalAnalysis, node: Node, labels: list[str], mesh: Sequence[float | None] | None
+def point_rows(
+    analysis: ModalAnalysis, point: SpeedPoint, labels: list[str], mesh: Sequence[float | None] | None
 ) -> list[dict[str, Any]]:
     """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch.
 
     Args:
         analysis: of the modes.
-        node: at the speed.
+        point: at the speed.
         labels: names of the branches.
         mesh: their relative errors by the mesh; None where they are not wanted.
     """
-    columns, rows = mode_rows(analysis, node.spinning.first(1 + max(node.order[: len(labels)]))), []
+    columns, rows = mode_rows(analysis, point.spinning.first(1 + max(point.order[: len(labels)]))), []
     own, of_rotors = "frequency frequency_hz damping growth residual error_bound", "turning whirl frequency_fixed"
     for b, label in enumerate(labels):
-        if node.order[b] < 0:
+        if point.order[b] < 0:
             continue
-        row = columns[node.order[b]]
+        row = columns[point.order[b]]
         rows.append(
             {
-                "speed": node.speed,
+                "speed": point.speed,
                 "branch": b + 1,
                 "label": label,
                 "mode": row["label"],
                 **{name: row[name] for name in own.split()},
                 **({} if mesh is None else {"mesh_error": mesh[b]}),
                 **{k: v for k, v in row.items() if k.startswith("share_") or k in of_rotors.split()},
-                "confidence": float(node.confidence[b]),
-                "refined": int(not node.requested),
+                "confidence": float(point.confidence[b]),
+                "refined": int(not point.requested),
             }
         )
     return rows

@@ -13,7 +13,7 @@ from scipy.special import ellipe, ellipk
 
 import rotfem
 from rotfem.analysis.arc_length import LoadPath, Tracer
-from rotfem.analysis.load_steps import Growth
+from rotfem.analysis.load_steps import LoadFactors
 from rotfem.numerics.newton import Newton
 
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
@@ -83,7 +83,7 @@ def test_newton_does_not_jump_to_another_stable_branch() -> None:
 def traced(scene: dict[str, Any], past_limits: bool = False) -> LoadPath:
     problem = rotfem.Problem.of(scene)
     system = problem.system(moving=False).held
-    return Tracer(system, Growth(problem.motion.speed(0.0)), Newton()).follow(past_limits)
+    return Tracer(system, LoadFactors(problem.motion.speed(0.0)), Newton()).follow(past_limits)
 
 
 def test_imperfections_lower_the_limit_load_by_koiters_power_law() -> None:

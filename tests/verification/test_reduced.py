@@ -127,7 +127,7 @@ def test_a_basis_of_all_unknowns_is_the_full_system(spin_up: MakeScene) -> None:
     """It grows by what the residual shows to lack until nothing lacks, and then solves the full equations."""
     scene = spin_up({"model.theory": "consistent_linear"}, mesh={"elements": 1}, loads={"tip_force": GUST})
     system, times = Problem.of(scene).system(), np.linspace(0.0, 4.0, 41)
-    growth = response.Growth(system, times, None)
+    growth = response.BasisEnrichment(system, times, None)
     sizes, lacking = [], []
     while True:
         equations = growth.equations()

@@ -108,7 +108,7 @@ def reduced_response(
     Raises:
         ComputationError: the stiffness is singular, or no motion is found.
     """
-    began, growth = (process_time(), perf_counter()), Growth(system, times, start)
+    began, growth = (process_time(), perf_counter()), BasisEnrichment(system, times, start)
     model, longest = growth.model, float(times[-1] - times[0]) / 64
     rounds, basis_error, time_error, before = 0, np.inf, 0.0, None
 
@@ -151,7 +151,7 @@ def reduced_response(
     return replace(out, seconds={"cpu": process_time() - began[0], "wall": perf_counter() - began[1]})
 
 
-class Growth:
+class BasisEnrichment:
     """A basis that grows with what the full system's residual shows it to lack, and the equations in it.
 
     Args:
