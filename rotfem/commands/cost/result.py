@@ -137,7 +137,8 @@ class CostResult(Rows):
         summary: scene, output, references with uncertainties, model errors, recommendation; JSON-able.
         rows: one dictionary a setting: `theory`, `elements`, `degree`, `scheme`, `step` (s), `tolerance`, `status`,
             `error`, `model_error`, `total_error`, `uncertainty` (relative), `time`, `time_min`, `time_max`, `cpu_time`,
-            `setup` (s; medians of `repeats`), `dofs`, `steps`, `iterations`, `pareto`, `reason`.
+            `setup` (s; medians of `repeats`), `cost` (CPU time with set-up, s), `dofs`, `steps`, `iterations`,
+            `pareto`, `reason`. `error` is that to the reference of the same theory, `time` is without set-up.
         scene: the scene studied.
         references: theory ↦ its finest output.
     """
