@@ -93,30 +93,42 @@ def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
         order: of the scheme that made it.
         comm: see `between`.
     """
-    h, mean = new.t - old.t, (new.q - old.q) / (new.t - old.t)
-    known = [[s.q, h * s.v] for s in (old, new)]
+    h = new.t - old.t
+    data = np.array((old.q, old.v, old.a, new.q, new.v, new.a)) * np.array([1.0, h, h * h] * 2)[:, None]
+    cubic, bent = _coefficients(2)
+    points = data[[0, 1, 3, 4]]
     if order > 2:
-        cubic = np.array([6 * mean - 4 * old.v - 2 * new.v, 2 * old.v + 4 * new.v - 6 * mean]) / h
-        sizes = [float(np.abs(x).max(initial=0.0)) for x in ([old.a, new.a] - cubic, cubic)]
+        accelerations = bent.dot(points)
+        sizes = [float(np.abs(x).max(initial=0.0)) for x in (data[2::3] - accelerations, accelerations)]
         off, size = sizes if comm.size == 1 else (comm.allreduce(x, MPI.MAX) for x in sizes)
         if off <= KNOWN * size:
-            known = [[*data, h * h * s.a] for data, s in zip(known, (old, new), strict=True)]
-    return np.asarray(_coefficients(len(known[0])) @ np.array([x for end in known for x in end]))
+            return np.asarray(_coefficients(3)[0].dot(data))
+    return np.asarray(cubic.dot(points))
 
 
 @cache
-def _coefficients(known: int) -> Array:
-    """Return the coefficients, by power, of the polynomials that are 1 in one datum of two ends and 0 in the others."""
-    ends = np.array([0.0, 1.0])
-    at = np.stack([monomials(ends, 2 * known, k) for k in range(known)], axis=1)
-    return np.asarray(np.linalg.inv(at.reshape(2 * known, 2 * known)), dtype=np.float64)
+def _coefficients(known: int) -> tuple[Array, Array]:
+    """Return the coefficients, by power, of the polynomials that are 1 in one datum of two ends and 0 in the others.
+
+    With them come their second derivatives at both ends.
+    """
+    ends, number = np.array([0.0, 1.0]), 2 * known
+    at = np.stack([monomials(ends, number, k) for k in range(known)], axis=1)
+    out = np.asarray(np.linalg.inv(at.reshape(number, number)), dtype=np.float64)
+    return out, monomials(ends, number, 2) @ out
 
 
 def monomials(x: Array, number: int, k: int) -> Array:
     """Return the k-th derivatives of 1, x, x² …, so many of them, (n, number)."""
+    exponents, factors = _derived(number, k)
+    return np.asarray(x[:, None] ** exponents * factors)
+
+
+@cache
+def _derived(number: int, k: int) -> tuple[Array, Array]:
+    """Return exponents and factors of the k-th derivatives of so many powers."""
     powers = np.arange(number)
-    falling = np.prod([powers - i for i in range(k)], axis=0)
-    return np.asarray(x[:, None] ** np.maximum(powers - k, 0) * falling)
+    return np.maximum(powers - k, 0), np.prod([powers - i for i in range(k)], axis=0)
 
 
 def end_acceleration(system: Any, state: State) -> Array:
