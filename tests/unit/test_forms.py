@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 from typing import Any
 
+import ffcx.compiler
 import numpy as np
 import pytest
 import ufl
@@ -21,7 +22,7 @@ from rotfem.commands.problem import Problem
 from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
-from rotfem.numerics import forms, traversal
+from rotfem.numerics import form_cache, forms, traversal
 from rotfem.numerics.forms import SAME, Assembler
 from tests.launch import ROOT
 
@@ -112,13 +113,34 @@ def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
     assert Functionals({}, space.mesh)() == {}
 
 
-def test_terminals_and_signatures_are_those_of_ufl() -> None:
-    """Traversals done once find what UFL finds, which is loaded anew, without them."""
-    spec = importlib.util.find_spec("ufl.algorithms.signature")
+def anew(name: str) -> Any:
+    """Return a module as it is without what `rotfem.numerics.traversal` puts into it."""
+    spec = importlib.util.find_spec(name)
     assert spec is not None
     assert spec.loader is not None
-    real = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(real)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_code_is_that_of_ffcx(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes found by their hash, and visited once, make the same code to the last letter."""
+    system = compile_system(Problem.of(rotfem.load_scene(ROOT / "demos" / "spin_up.toml")))
+
+    def code() -> Any:
+        return ffcx.compiler.compile_ufl_objects([system._residual_form, system._tangent_form], form_cache.OPTIONS)
+
+    here = code()
+    monkeypatch.setattr(ufl.corealg.map_dag, "map_expr_dags", anew("ufl.corealg.map_dag").map_expr_dags)
+    numbering = "ffcx.ir.analysis.valuenumbering"
+    real = anew(numbering).ValueNumberer.get_node_symbols
+    monkeypatch.setattr(f"{numbering}.ValueNumberer.get_node_symbols", real)
+    assert code() == here
+
+
+def test_terminals_and_signatures_are_those_of_ufl() -> None:
+    """Traversals done once find what UFL finds, which is loaded anew, without them."""
+    real = anew("ufl.algorithms.signature")
     system = compile_system(Problem.of(rotfem.load_scene(ROOT / "demos" / "spin_up.toml")))
     for form in (system._residual_form, system._tangent_form):
         for classes in (ufl.Constant, (BaseArgument, BaseCoefficient), Counted, ufl.classes.SpatialCoordinate):
