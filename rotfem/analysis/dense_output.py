@@ -74,7 +74,7 @@ def between(old: State, new: State, times: list[float], order: int, comm: MPI.Co
         return []
     h, curve = new.t - old.t, polynomial(old, new, order, comm)
     shares = (np.array(times, dtype=np.float64) - old.t) / np.float64(h)
-    moved = [monomials(shares, len(curve), k) @ curve / h**k for k in range(3)]
+    moved = [x / h**k for k, x in enumerate(derivatives(curve, shares))]
     out = []
     for t, share, q, v, a in zip(times, shares, *moved, strict=True):
         given = None
@@ -113,22 +113,19 @@ def _coefficients(known: int) -> tuple[Array, Array]:
     With them come their second derivatives at both ends.
     """
     ends, number = np.array([0.0, 1.0]), 2 * known
-    at = np.stack([monomials(ends, number, k) for k in range(known)], axis=1)
+    at = np.stack(derivatives(np.eye(number), ends)[:known], axis=1)
     out = np.asarray(np.linalg.inv(at.reshape(number, number)), dtype=np.float64)
-    return out, monomials(ends, number, 2) @ out
+    return out, derivatives(out, ends)[2]
 
 
-def monomials(x: Array, number: int, k: int) -> Array:
-    """Return the k-th derivatives of 1, x, x² …, so many of them, (n, number)."""
-    exponents, factors = _derived(number, k)
-    return np.asarray(x[:, None] ** exponents * factors)
-
-
-@cache
-def _derived(number: int, k: int) -> tuple[Array, Array]:
-    """Return exponents and factors of the k-th derivatives of so many powers."""
-    powers = np.arange(number)
-    return np.maximum(powers - k, 0), np.prod([powers - i for i in range(k)], axis=0)
+def derivatives(curve: Array, x: Array) -> list[Array]:
+    """Return polynomials of coefficients (powers, number) and their first two derivatives at x, (n, number) each."""
+    out = []
+    for _ in range(3):
+        powers = np.arange(len(curve))
+        out.append(x[:, None] ** powers @ curve)
+        curve = powers[1:, None] * curve[1:]
+    return out
 
 
 def end_acceleration(system: Any, state: State) -> Array:

@@ -148,19 +148,10 @@ class Together(list[Stage]):
         self.arrays = np.array([[getattr(s, name) for s in stages] for name in "qva"])
         for i, stage in enumerate(self):
             stage.q, stage.v, stage.a = self.arrays[:, i]
-        self.start = self.arrays
 
     def correct(self, dq: Array) -> None:
         """Change q by dq (3, …), and the rates by what follows from it."""
         self.arrays += self.rates.dot(dq).reshape(self.arrays.shape)
-
-    def begin(self) -> None:
-        """Take note of where iterations start."""
-        self.start = self.arrays.copy()
-
-    def go_back(self) -> None:
-        """Go back to where they started."""
-        self.arrays[:] = self.start
 
 
 @dataclass(frozen=True)
@@ -200,13 +191,13 @@ class RadauIIA(Scheme):
             stages.correct(h**2 * A @ A @ change)
         else:
             stages.correct(np.array([equations.predicted(s, state) - s.q for s in stages]))
-        stages.begin()
+        begin = stages.arrays.copy()
         if (known := equations.linearised(None)) is not None and iterate(stages, h, equations, known, False) is None:
             return stages
         size: float | None = np.inf
         for last in (False, False, True):
-            if not equations.system.increment_size(np.abs(stages.arrays[0] - stages.start[0]).max(axis=0)) < 0.5:
-                stages.go_back()
+            if not equations.system.increment_size(np.abs(stages.arrays[0] - begin[0]).max(axis=0)) < 0.5:
+                stages.arrays[:] = begin
             size = iterate(stages, h, equations, equations.linearised(stages[1]), last)
             if size is None:
                 return stages

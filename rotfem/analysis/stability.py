@@ -206,7 +206,7 @@ def _energies(pencil: Pencil, pairs: Eigenpairs) -> Array:
     X = pairs.right
     kinetic, potential = (np.real(X.conj() * pencil.apply(A, X)).sum(axis=0) for A in (pencil.M, pencil.K))
     local = np.abs(pairs.values) ** 2 * kinetic + potential
-    return np.asarray(pencil.comm.allreduce(local) if pencil.comm.size > 1 else local)
+    return np.asarray(summed(pencil.comm, local))
 
 
 # --- constant conditions: an equilibrium that a history moves about ---------------------------------------------------

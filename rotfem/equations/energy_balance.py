@@ -26,12 +26,12 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from rotfem.equations.solutions import Solutions
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.numerics import compat, forms
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class EnergyBalance(Solutions):
         self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))
         self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
         self._F, self._J = forms.form(self._residual), forms.form(self._tangent)
-        self.A = fem_petsc.create_matrix(self._J)
+        self.A = system.assembler.zero()
         self._inertia = compat.create_vector(system.V)
         self._moved = compat.wrap(self._move.x)
         self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
@@ -162,8 +162,7 @@ class EnergyBalance(Solutions):
 
     def _product(self, x: Array, y: Array, chosen: Any = None) -> float:
         chosen = self._owned if chosen is None else chosen
-        here = float(x[chosen] @ y[chosen])
-        return here if self.comm.size == 1 else float(self.comm.allreduce(here))
+        return float(summed(self.comm, x[chosen] @ y[chosen]))
 
     # --- solutions ---------------------------------------------------------------------------------------------------
 
@@ -174,8 +173,7 @@ class EnergyBalance(Solutions):
             self._balance(b)
         if (part := self.system.by_mode) is not None:
             b[self._owned] += part.times(self._state[1][self._owned])
-        np.negative(b, out=b)
-        b[self.system.clamped] = 0.0
+        b *= self.system.signs
         return self.system.b
 
     def _balance(self, b: Array) -> None:
@@ -198,8 +196,6 @@ class EnergyBalance(Solutions):
             constant.value = value
         self._before.x.array[:] = self._end.x.array if before is None else 2 * before - self._q_0
         self._ahead.x.array[:] = self._end.x.array - self._before.x.array
-        self.A.zeroEntries()
-        fem_petsc.assemble_matrix(self.A, self._J, self.system.bcs)
-        self.A.assemble()
+        self.system.assembler(self._J, diagonal=1.0, into=self.A)
         self.A.axpy(self._factor, self._N, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return self.system.with_modes(self.A, c_v), True

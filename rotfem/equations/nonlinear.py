@@ -120,8 +120,8 @@ class NonlinearSystem(System):
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._shift_entries = [constant.value for constant in self._shifts]  # where they are
         self._spin: Any = None
-        self._signs = np.full_like(self._b_array, -1.0)
-        self._signs[self.clamped] = 0.0
+        self.signs = np.full_like(self._b_array, -1.0)
+        self.signs[self.clamped] = 0.0
         if self.moving:
             residuals = self.model.by_strains() if self.parted else [self._residual_form]
             libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
@@ -134,13 +134,13 @@ class NonlinearSystem(System):
         else:
             self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
-        self._assemble = Assembler(self._pattern, self.bcs)
-        return self._assemble.zero()
+        self.assembler = Assembler(self._pattern, self.bcs)
+        return self.assembler.zero()
 
     def twin(self) -> Self:
         """Return another system of the same forms (see `System.twin`)."""
         other = super().twin()
-        other.A = self._assemble.zero()
+        other.A = self.assembler.zero()
         return other
 
     @cached_property
@@ -207,7 +207,7 @@ class NonlinearSystem(System):
 
     def _negative(self, parts: list[Any], moving: bool) -> Any:
         b = self.sum_of(parts)
-        b *= self._signs
+        b *= self.signs
         if moving and self.by_mode is not None:
             owned = self.b.array
             owned -= self.by_mode.times(self._state[1][: len(owned)])
@@ -237,14 +237,11 @@ class NonlinearSystem(System):
 
     def whole(self, kind: str) -> Any:
         """Return K, C or M at the state with the rows of the clamp, a new matrix; None where it vanishes."""
-        if self.moving:
-            self.shift(tuple(float(kind == name) for name in "KCM"))
-            return self.whole_of(self._J)
-        return self.whole_of([self._parts[kind]] if kind in self._parts else [])
+        return self.whole_of(self._terms(tuple(float(kind == name) for name in "KCM")))
 
     def whole_of(self, parts: list[Any]) -> Any:
         """Return compiled bilinear forms added up, a new matrix with the rows of the clamp; None of none."""
-        return self._assemble(*parts) if parts else None
+        return self.assembler(*parts) if parts else None
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.
@@ -261,11 +258,11 @@ class NonlinearSystem(System):
             self._stresses.come_from(before)
             self.shift((c_k, c_v, c_m))
             parts = [self._on_the_way]
-        return self.with_modes(self._assemble(*parts, diagonal=1.0, into=self.A), c_v), True
+        return self.with_modes(self.assembler(*parts, diagonal=1.0, into=self.A), c_v), True
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-        return self.with_modes(self._assemble(*self._terms((c_k, c_v, c_m)), diagonal=diagonal), c_v)
+        return self.with_modes(self.assembler(*self._terms((c_k, c_v, c_m)), diagonal=diagonal), c_v)
 
     def shift(self, shifts: tuple[float, ...]) -> None:
         """Set the factors of K, C and M in the form J."""
@@ -274,15 +271,13 @@ class NonlinearSystem(System):
                 entry[()] = value
             self._shift_values[:] = shifts
 
-    def _terms(self, shifts: tuple[float, float, float]) -> list[Any]:
+    def _terms(self, shifts: tuple[float, ...]) -> list[Any]:
         """Return the compiled forms whose sum is c_k K + c_v C + c_m M."""
         if self.moving:
             self.shift(shifts)
             return self._J
-        wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
-        assert shifts == tuple(float(name in wanted) for name in "KCM")
-        assert len(wanted) == 1
-        return [self._parts[wanted[0]]] if wanted[0] in self._parts else []
+        assert sorted(shifts) == [0.0, 0.0, 1.0]
+        return [self._parts[name] for name, c in zip("KCM", shifts, strict=True) if c and name in self._parts]
 
     @cached_property
     def _by_spin(self) -> BySpin:

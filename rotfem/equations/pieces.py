@@ -20,12 +20,12 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import AtClamp
 from rotfem.equations.model import Model
+from rotfem.equations.nonlinear import assembled
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.theories import Theory, richest
 from rotfem.numerics import compat, forms
@@ -396,10 +396,7 @@ class Pieces:
     def assemble(self, form: Any, kind: str) -> Any:
         """Return a compiled form as a new PETSc vector (of "f") or matrix, the clamp not held."""
         if kind == "f":
-            b = compat.create_vector(self.V)
-            fem_petsc.assemble_vector(b, form)
-            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-            return b
+            return assembled(form, self.V, [])
         return self.assembler(form)
 
     @cached_property

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import ComplexSolver, DirectSolver, Increment, SingularSolver, combine, is_regular
-from rotfem.numerics.projection import with_ghosts
+from rotfem.numerics.projection import summed, with_ghosts
 
 Array = npt.NDArray[Any]
 
@@ -214,5 +214,4 @@ class BorderedLinearised(Linearised):
         return out[0], out[1]
 
     def _product(self, row: Array, x: Array) -> Any:
-        here, comm = row @ x[: len(row)], self.system.held.comm
-        return here if comm.size == 1 else comm.allreduce(here)
+        return summed(self.system.held.comm, row @ x[: len(row)])

@@ -30,7 +30,7 @@ from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.projection import PlusLowRank
+from rotfem.numerics.projection import PlusLowRank, summed
 from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
@@ -340,8 +340,7 @@ class System(Solutions, ABC):
     def product(self, x: Array, y: Array) -> float:
         """Return the sum of the products of the entries of two local dof arrays in units of `scale`, over all ranks."""
         owned = slice(0, self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs)
-        here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
-        return here if self.comm.size == 1 else self.comm.allreduce(here)
+        return float(summed(self.comm, (x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned])))
 
     increment_size = size  # of a correction by which Newton is judged; a hub's angle is among the unknowns then
 
@@ -373,8 +372,7 @@ class System(Solutions, ABC):
 
         The moment is about the root, `root.place`; keys f1, f2, … m3, as far as the structure has them.
         """
-        here = self.clamp_forces()
-        values = here if self.comm.size == 1 else self.comm.allreduce(here)
+        values = summed(self.comm, self.clamp_forces())
         found = dict(zip(self.root.names, map(float, values), strict=True))
         if self.clamp is not None:
             c, s = np.cos(self.clamp.angle(self.time)), np.sin(self.clamp.angle(self.time))
@@ -410,10 +408,7 @@ class System(Solutions, ABC):
 
     def total(self, form: Any) -> float:
         """Return the value of a compiled functional over all ranks; 0 of None."""
-        if form is None:
-            return 0.0
-        here = float(fem.assemble_scalar(form))
-        return here if self.comm.size == 1 else float(self.comm.allreduce(here))
+        return 0.0 if form is None else float(summed(self.comm, fem.assemble_scalar(form)))
 
     def outputs(self) -> dict[str, float]:
         """Return the functionals of the problem at the state and time set."""

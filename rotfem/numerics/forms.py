@@ -51,7 +51,7 @@ class Assembler:
         self._bcs, self._held = bcs, [bc._cpp_object for bc in bcs]
         if form.mesh.comm.size == 1:
             self._own = fem.create_matrix(form, la.BlockMode.expanded)
-            self._entries: npt.NDArray[np.float64] = np.asarray(self._own.data)
+            self._entries: Any = np.asarray(self._own.data)
             self._rows, self._columns = (np.array(x, PETSc.IntType) for x in (self._own.indptr, self._own.indices))
             size, self._space = (len(self._rows) - 1,) * 2, form._cpp_object.function_spaces[0]
             self._sizes, self._block, self._comm = size, self._space.dofmap.index_map_bs, form.mesh.comm
@@ -64,8 +64,7 @@ class Assembler:
 
     def release(self) -> None:
         """Give back the memory of a matrix; PETSc assembles what is still to come."""
-        self._own = self._kept = None
-        self._entries = np.empty(0)
+        self._own = self._kept = self._entries = None
 
     def zero(self) -> Any:
         """Return a new matrix of zeros, which takes up memory when it is filled."""
@@ -121,7 +120,7 @@ class Assembler:
         self._columns = self._columns[self._kept]
         self.pattern = self._with(np.zeros(len(self._columns)))
 
-    def _assembled(self, *several: Any, diagonal: float | None = None) -> npt.NDArray[np.float64]:
+    def _assembled(self, *several: Any, diagonal: float | None = None) -> Any:
         """Return the entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
         A, held = self._own._cpp_object, [] if diagonal is None else self._held
         self._entries.fill(0.0)

@@ -230,9 +230,8 @@ class Companion:
         if self.interval is not None:
             row = round((old.t + new.t) / (2 * self.interval)) * self.interval
             if old.t < row < new.t:
-                order = self.stepper.scheme.order
-                comm = self.system.comm
-                self._compare(between(old, new, [row], order, comm)[0], step.state_at(row, order, comm))
+                known = self.stepper.scheme.order, self.system.comm
+                self._compare(between(old, new, [row], *known)[0], step.state_at(row, *known))
         for companion in self.further:
             companion(old, new, leg)
 
