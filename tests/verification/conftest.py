@@ -89,6 +89,10 @@ def reference() -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def unestimated(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the estimates of errors, as output.error = false does: they move no answer (tests.pairs)."""
-    monkeypatch.setattr(OutputTable, "error", property(lambda _: False), raising=False)
+def unestimated(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the estimates of errors, as output.error = false does: they move no answer (tests.pairs).
+
+    Tests marked `estimated` keep them.
+    """
+    if request.node.get_closest_marker("estimated") is None:
+        monkeypatch.setattr(OutputTable, "error", property(lambda _: False), raising=False)

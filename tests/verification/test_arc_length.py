@@ -16,6 +16,8 @@ from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.analysis.load_steps import LoadFactors
 from rotfem.numerics.newton import Newton
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
 
 

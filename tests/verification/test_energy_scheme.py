@@ -19,6 +19,8 @@ from rotfem.results import RunResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 NONLINEAR = [theory.name for theory in theories() if not theory.linear]

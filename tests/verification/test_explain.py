@@ -515,8 +515,8 @@ def test_modes_and_campbell_choose_too() -> None:
 @pytest.mark.parametrize("motion", [{"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 2.0}])
 def test_a_blow_of_four_milliseconds_does_not_cost_the_tolerance(motion: dict[str, Any]) -> None:
     blow = [[0, 0, 0], [1.501, 0, 0], [1.503, 0, 4000.0], [1.505, 0, 0], [9.0, 0, 0]]
-    changes = {"loads": {"tip_force": blow}, "motion": motion, "time": {"end": 2.5, "step": 0.001, "output_every": 10}}
-    full = rotfem.run(scene(SPIN_UP, changes))
+    changes = {"loads": {"tip_force": blow}, "motion": motion, "time": {"end": 2.0, "step": 0.001, "output_every": 10}}
+    full = rotfem.run(scene(SPIN_UP, changes | {"output.error": False}))
     result = rotfem.run(scene(SPIN_UP, changes | {"model.tolerance": 1e-2}))
     assert distance(tip(full), tip(result)) < 1e-2
 

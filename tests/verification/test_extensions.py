@@ -16,6 +16,8 @@ import rotfem
 from rotfem import registry
 from rotfem.errors import SceneError
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 FILES = Path(__file__).resolve().parents[2] / "demos" / "extensions"
 KINDS = (registry.theories, registry.effects, registry.schemes, registry.shapes, registry.outputs)
 
@@ -250,6 +252,7 @@ def test_a_term_without_a_derivative_at_rest_is_refused(motion: dict[str, Any], 
         rotfem.run(beam({"motion": motion, "model.theory": theory}), terms={"air": quadratic})
 
 
+@pytest.mark.estimated
 @pytest.mark.parametrize("constants", [None, ("w",), ("w", "w")])
 def test_linear_theories_refuse_what_is_no_polynomial_of_the_speed(constants: tuple[str, ...] | None) -> None:
     """Quadratic drag c |v| v: |w| w is odd as w, and 1 at 1 as w and w²; linear drag with a wrong declaration."""

@@ -10,6 +10,8 @@ import pytest
 from rotfem import campbell, modes
 from tests import frequency_bounds
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 #: Largest allowed factor between a bound and the error in the middle of all cases: a bound that is always huge is none.
 WORTH = 200.0
 

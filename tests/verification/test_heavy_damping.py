@@ -23,6 +23,8 @@ from rotfem import ComputationError, campbell, modes
 from rotfem.numerics.ritz import RitzPairs
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[Any]
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}

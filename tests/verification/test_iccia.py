@@ -21,6 +21,8 @@ from scipy.integrate import solve_ivp
 from rotfem import ComputationError, run
 from rotfem.mechanics.motion import smooth_spin_up
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 TIME = {"end": 30.0, "step": 0.01, "output_every": 4}
@@ -85,6 +87,7 @@ def test_zero_order_theory_diverges(hub_beam: Any, speed: float) -> None:
     assert critical < speeds[-1] < speed  # beyond the critical speed, and still on the way up
 
 
+@pytest.mark.estimated
 def test_zero_order_theory_holds_below_its_critical_speed(hub_beam: Any) -> None:
     """At 2.85 rad/s it still computes (softened by then to a fifth of the frequency), at 2.95 rad/s it diverges."""
     time = {"end": 60.0, "step": 0.05, "output_every": 10}

@@ -9,6 +9,8 @@ import pytest
 from rotfem import Problem, RunResult, run
 from rotfem.analysis.theory_error import conditioning
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 #: Tip deflection that is asked for, over the length.
 SMALL = 1e-3
 

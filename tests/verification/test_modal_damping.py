@@ -24,6 +24,8 @@ from rotfem.results import ModesResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 SECTION = {"EA": 2.8e7, "GA2": 1e7, "GA3": 1e7, "GJ": 1e4, "EI2": 1.4e4, "EI3": 2.8e4, "mass_per_length": 1.2}
@@ -209,6 +211,7 @@ def test_spinning_beam_loses_what_damping_takes() -> None:
     assert energies[0] - energies[-1] == pytest.approx(lost, rel=1e-9)
 
 
+@pytest.mark.estimated
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
 def test_error_of_the_mesh_is_that_of_the_undamped_beam(theory: str) -> None:
     """Forces on the finer mesh have the damping too: without it they would be out of balance by all of it."""

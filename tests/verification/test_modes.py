@@ -30,6 +30,8 @@ from rotfem.numerics import eigenproblem as pencil
 from rotfem.numerics.linear import transposed
 from rotfem.results import ModesResult
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[Any]
 
 #: Name of the linearisation in the reference values, and here.

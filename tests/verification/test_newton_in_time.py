@@ -24,6 +24,8 @@ from rotfem.numerics import forms
 from rotfem.numerics.newton import Newton
 from rotfem.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
 
 #: Places in a cell, between its nodes.

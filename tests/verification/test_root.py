@@ -12,6 +12,8 @@ from scipy.optimize import brentq
 
 import rotfem
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 L, RHO = 10.0, 1.2
 STILL, SPIN = {"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 5.0}
 #: So stiff that the blade is rigid: its first frequency of bending is 90 Ω.

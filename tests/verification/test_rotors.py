@@ -15,6 +15,8 @@ from rotfem.commands.problem import Problem
 from rotfem.structures.symmetry import inactive_unknowns
 from tests.figures import check
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 EI, LENGTH, MASS, POLAR, DIAMETRAL = 1649.0, 0.4, 5.0, 0.04, 0.02
 
 

@@ -13,6 +13,8 @@ import pytest
 
 from rotfem import campbell, modes, run
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 #: Units of length, mass and time in m, kg and s.
 UNITS = [
     (1e-2, 1.0, 1.0),

@@ -18,6 +18,8 @@ from scipy.sparse import load_npz
 from rotfem import OutputError, modes, run
 from rotfem.analysis.state_space import state_space, write_matrices
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 SPINNING = {"structure.hub_radius": 1.0, "motion": {"type": "constant", "speed": 6.0}, "modes.count": 6}

@@ -12,6 +12,8 @@ from scipy.optimize import brentq
 import rotfem
 from rotfem.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 ARC = 100.0 * np.pi / 4
 
 
