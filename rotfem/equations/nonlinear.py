@@ -113,6 +113,10 @@ class NonlinearSystem(System):
         moving: see `System`.
         parted: whether what has the theory's strains is compiled by itself in a history. The rest, inertia and loads,
             is most of the work, and that of another theory, too.
+
+    Attributes:
+        assembler: makes the matrices.
+        signs: −1 of every local unknown, 0 where it is clamped.
     """
 
     def _compile(self) -> Any:

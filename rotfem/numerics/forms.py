@@ -125,7 +125,8 @@ class Assembler:
         A, held = self._own._cpp_object, [] if diagonal is None else self._held
         self._entries.fill(0.0)
         for form in several:
-            cpp.fem.assemble_matrix(A, *packed(form), held)
+            code = form._cpp_object
+            cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), held)
         if diagonal is not None:
             cpp.fem.insert_diagonal(A, self._space, held, diagonal)
         return self._entries
@@ -138,15 +139,10 @@ class Assembler:
         return A
 
 
-def packed(form: Any) -> tuple[Any, Any, Any]:
-    """Return what dolfinx assembles of a compiled form: its code, and its constants and coefficients of now."""
-    code = form._cpp_object
-    return code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code)
-
-
 def add_vector(b: npt.NDArray[np.float64], form: Any) -> None:
     """Add a compiled linear form to a local dof array."""
-    cpp.fem.assemble_vector(b, *packed(form))
+    code = form._cpp_object
+    cpp.fem.assemble_vector(b, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code))
 
 
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or
