@@ -79,10 +79,10 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
     structure = analysis.structure
     spinning = spinning.first(count)
     pairs, n = spinning.pairs, np.diag(spinning.own)
-    tip = np.arange(structure.tip_values.dofs.start, structure.tip_values.dofs.stop)
+    tip = structure.tip_values.columns(len(spinning.q))
     blocks, rows, columns = [], [], []
     for j, lam in enumerate(pairs.values):
-        gain, shape = pairs.left[tip, j].conj() / n[j], pairs.right[tip, j]
+        gain, shape = tip.T @ pairs.left[:, j].conj() / n[j], tip.T @ pairs.right[:, j]
         if lam.imag > 0.0:
             blocks.append(np.array([[lam.real, -lam.imag], [lam.imag, lam.real]]))
             rows += [gain.real, gain.imag]
@@ -93,9 +93,7 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
             columns.append(shape.real)
     A = block_diag(*blocks)
     B, C = np.array(rows), np.array(columns).T
-    units = np.zeros((len(spinning.q), len(tip)))
-    units[tip, np.arange(len(tip))] = 1.0
-    flexibility = DirectSolver(spinning.pencil.K).solve_all(units)[tip]  # static answer to unit forces and moment
+    flexibility = tip.T @ DirectSolver(spinning.pencil.K).solve_all(tip)  # static answer to unit forces and moment
     D = flexibility + C @ np.linalg.solve(A, B)
     outputs = tuple(f"tip_{name}" for name in structure.components)
     return StateSpace(A, B, C, D, structure.tip_inputs, outputs, spinning.speed)

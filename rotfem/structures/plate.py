@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
@@ -188,8 +189,7 @@ class Plate(Structure):
             return np.array([self.data.length, 0.0, 0.0])
         x = self.V.tabulate_dof_coordinates()
         if self._has_tip:
-            here = x[fem.locate_dofs_topological(self.V, 1, self.grid.edges("tip"))]
-            return np.asarray(np.concatenate(self.comm.allgather(here)).mean(axis=0))
+            return self._middle(self.grid.edges("tip"))
         clamp = np.concatenate(self.comm.allgather(x[self.clamped]))
         distance = np.full(len(x), np.inf)
         for part in np.array_split(clamp, max(1, len(clamp) // 200)):
@@ -197,6 +197,18 @@ class Plate(Structure):
         best = int(np.argmax(distance)) if len(x) else 0
         candidates = self.comm.allgather((float(distance[best]), *map(float, x[best])) if len(x) else (-1.0, 0, 0, 0))
         return np.array(max(candidates)[1:])
+
+    def _middle(self, edges: Any) -> Array:
+        """Return the point of a curve, local edges, that is nearest to its centre of length, m."""
+        own = edges[edges < self.mesh.topology.index_map(1).size_local]
+        nodes = entities_to_geometry(self.mesh, 1, own)[:, :2] if len(own) else np.empty((0, 2), dtype=int)
+        ends = self.mesh.geometry.x[nodes]
+        a, b = np.moveaxis(np.concatenate(self.comm.allgather(ends)), 1, 0)
+        length = np.linalg.norm(b - a, axis=1)
+        centre = length @ (a + b) / (2 * length.sum())
+        along = np.clip(np.sum((centre - a) * (b - a), axis=1) / length**2, 0.0, 1.0)
+        points = a + along[:, None] * (b - a)
+        return np.asarray(points[np.argmin(np.linalg.norm(points - centre, axis=1))])
 
     # --- section ----------------------------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import Amplitude, SpanField, first
 from rotfem.structures.mode_names import Wave
-from rotfem.structures.points import Points
+from rotfem.structures.points import Points, locate
 from rotfem.structures.reference_rotation import Turns
 
 Array = npt.NDArray[np.float64]
@@ -82,30 +82,43 @@ def memory() -> float:
 
 
 class TipValues:
-    """Reads a blocked Lagrange function at the node nearest to a point.
+    """Reads a blocked Lagrange function at a point: Σ_k φ_k q_k over the nodes of a cell that holds it.
+
+    That of the nearest node if no cell does, as beside a curved edge.
 
     Attributes:
-        owner: rank that owns the node.
-        dofs: local numbers of its unknowns there.
-        size: number of unknowns of a node.
+        dofs: local numbers of the unknowns of those nodes that this process owns, (nodes, unknowns of a node).
+        weights: φ_k of these nodes at the point.
     """
 
-    def __init__(self, V: fem.FunctionSpace, point: npt.ArrayLike):
-        self._comm, self.size = V.mesh.comm, V.dofmap.index_map_bs
-        owned = V.dofmap.index_map.size_local
-        distance = np.linalg.norm(V.tabulate_dof_coordinates()[:owned] - np.asarray(point), axis=1)
-        nearest = float(distance.min()) if owned else np.inf
-        self.owner = min(self._comm.allgather((nearest, self._comm.rank)))[1]
-        node = int(distance.argmin()) if owned else 0
-        self.dofs = slice(node * self.size, (node + 1) * self.size)
+    def __init__(self, V: fem.FunctionSpace, point: Array):
+        self._comm, nodes, size = V.mesh.comm, V.dofmap.index_map, V.dofmap.index_map_bs
+        place, here = locate(V.mesh, list(point)), None
+        if place is None:
+            apart = np.linalg.norm(V.tabulate_dof_coordinates()[: nodes.size_local] - point, axis=1)
+            nearest = float(apart.min(initial=np.inf)), self._comm.rank
+            if nearest == min(self._comm.allgather(nearest)):
+                here = nodes.local_to_global(np.array([apart.argmin()], dtype=np.int32)), np.ones(1)
+        elif len(place[0]):
+            shapes = V.element.basix_element.tabulate(0, place[1])[0, 0, :, 0]
+            here = nodes.local_to_global(V.dofmap.cell_dofs(place[0][0])), np.round(shapes, 14)  # 0 and 1 at nodes
+        numbers, weights = next(found for found in self._comm.allgather(here) if found is not None)
+        local = nodes.global_to_local(numbers)
+        own = (local >= 0) & (local < nodes.size_local) & (weights != 0.0)
+        self.dofs, self.weights = local[own, None] * size + np.arange(size), weights[own]
 
-    def __call__(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def __call__(self, values: Array) -> Array:
         """Return the (block size,) values at the point from a local dof array of the space."""
-        if self._comm.size == 1:
-            return values[self.dofs].copy()
-        here = values[self.dofs].copy() if self._comm.rank == self.owner else np.empty(self.size)
-        self._comm.Bcast(here, root=self.owner)
-        return here
+        here = self.weights @ values[self.dofs]
+        if self._comm.size > 1:
+            self._comm.Allreduce(MPI.IN_PLACE, here, op=MPI.SUM)
+        return np.asarray(here)
+
+    def columns(self, length: int) -> Array:
+        """Return the weights of the unknowns in these values, (length, block size), on one process."""
+        out = np.zeros((length, self.dofs.shape[1]))
+        out[self.dofs, np.arange(self.dofs.shape[1])] = self.weights[:, None]
+        return out
 
 
 class Structure:

@@ -483,6 +483,27 @@ def test_modes_in_the_plane_are_those_of_the_beam(theory: str) -> None:
     assert first[0] == pytest.approx(first[1], rel=1e-3)
 
 
+def test_tip_is_the_middle_of_its_edge(tmp_path: Path) -> None:
+    """No node need lie there: by symmetry the middle of a plate stretched by spin does not move across.
+
+    The middle of an edge of a file is that of its length, wherever its nodes are: a linear field is read exactly.
+    """
+    three = {"mesh.elements": [6, 3], "mesh.degree": 3}
+    spun = square(0.01).replace({"motion.speed": 100.0, "motion.axis": [0.0, 0.0, 1.0], **three})
+    tip = {name: float(values[-1]) for name, values in rotfem.run(spun).tip.items()}
+    assert tip["u1"] > 1e-6
+    assert abs(tip["u2"]) < 1e-9 * tip["u1"]
+    points, groups = grid(3, 3)
+    points[:, 1] += 0.2 * (0.25 - points[:, 1] ** 2)  # edges of other lengths
+    file = write_msh(tmp_path / "plate.msh", points, groups)
+    scene = square(0.01).replace({"structure.length": None, "structure.width": None, "structure.mesh": str(file)})
+    for degree in (2, 3):
+        structure = rotfem.modes(scene.replace({"mesh.degree": degree})).analysis.structure
+        linear = structure.V.tabulate_dof_coordinates() @ np.array([1.0, 3.0, 0.0])
+        read = structure.tip_values(np.repeat(linear, structure.size))
+        assert read == pytest.approx(np.ones(structure.size), abs=1e-12)
+
+
 def test_analysis_keeps_its_space() -> None:
     analysis = ModalAnalysis(Problem.of(square(0.01, mesh__elements=[2, 2])))
     assert analysis.system.V.dofmap.index_map_bs == 5
