@@ -7,9 +7,10 @@ is the change by the model,
 
     max_t |u_model − u_own| / max_t |u_own|,    max_i |λ_model,i − λ_own,i| / |λ_own,i|,
 
-with u the displacement of the tip and λ the eigenvalues, sorted by size. Where the own answer is in error by more than
-the asymptotic range, changes that are not large are marched again in half the steps. Steady states and modes are on
-half the cells, too.
+with u the displacement of the tip and λ the eigenvalues, sorted by size. Their errors are not the same where steps damp
+or delay the one more than the other. So changes that are neither negligible nor large are marched again in half the
+steps, and all that are not large where the own answer is in error by more than the asymptotic range. Steady states and
+modes are on half the cells, too.
 """
 
 from __future__ import annotations
@@ -174,6 +175,9 @@ class Change:
     def settle(self, output: str, size: float | None, rough: float | None, error: float) -> bool:
         """Take the size of the change of an output; return whether it is known.
 
+        That is one that is large, one that is negligible while the own answer is in the asymptotic range, and one that
+        is the same in steps of twice the length within SAFETY.
+
         Args:
             output: name.
             size: computed; None where that failed.
@@ -182,8 +186,10 @@ class Change:
         """
         size = size if error <= FAR else None
         self.estimate[output], self.bounds = size, [name for name in self.bounds if name != output]
-        if size is None or error <= ASYMPTOTIC or size >= LARGE:
+        if size is None or size >= LARGE:
             return size is not None
+        if error <= ASYMPTOTIC and SAFETY * size < NOTICEABLE:
+            return True
         if rough is not None and max(size, rough) > SAFETY * min(size, rough):
             self.estimate[output] = max(size, rough)
             self.bounds.append(output)
@@ -325,8 +331,7 @@ class Explanation:
     def _refine(self, system: Any, own: History, error: float | None) -> None:
         """March the changes in steps as long as the error allows, and those in doubt again in shorter ones.
 
-        A change is known where the error of the own model in these steps is in the asymptotic range, or where it is the
-        same in steps of twice the length within a factor of SAFETY. Else it is below the larger of the two.
+        Where a change is not the same in two step lengths within a factor of SAFETY, it is below the larger of the two.
 
         Args:
             system: of the own model, on the mesh of the comparison.

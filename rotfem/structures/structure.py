@@ -20,6 +20,7 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Root
 from rotfem.mechanics.loads import AnyLoad, PlaceLoad, PointLoads, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
+from rotfem.numerics.projection import summed
 from rotfem.structures.applied_loads import Amplitude, SpanField, first
 from rotfem.structures.mode_names import Wave
 from rotfem.structures.points import Points, locate
@@ -109,10 +110,7 @@ class TipValues:
 
     def __call__(self, values: Array) -> Array:
         """Return the (block size,) values at the point from a local dof array of the space."""
-        here = self.weights @ values[self.dofs]
-        if self._comm.size > 1:
-            self._comm.Allreduce(MPI.IN_PLACE, here, op=MPI.SUM)
-        return np.asarray(here)
+        return np.asarray(summed(self._comm, self.weights @ values[self.dofs]))
 
     def columns(self, length: int) -> Array:
         """Return the weights of the unknowns in these values, (length, block size), on one process."""

@@ -358,6 +358,30 @@ def test_change_by_damping_is_the_damping_ratio() -> None:
     assert rows["damping"]["estimate"][MODES] == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
 
 
+@pytest.mark.parametrize("bending", [2.0e4, 3.0e4])
+def test_change_by_damping_that_long_steps_hide(bending: float) -> None:
+    """Steps damp and delay the undamped vibration of a beam in gusts more than the damped one."""
+    section = {"EA": 2.2e8, "GA": 7.0e7, "EI": bending, "mass_per_length": 8.0, "rotary_inertia": 9e-4}
+    beam = {"type": "planar_beam", "length": 4.2, "hub_radius": 0.3, "section": section}
+    gusts = [[0, 0, 0], [4, 0, 20.0], [9, 0, -10.0], [15, 0, 25.0], [22, 0, 5.0], [30, 0, 0]]
+    asked = Scene.from_dict(
+        {
+            "structure": {**beam, "damping": {"rayleigh": [0.5, 5e-5]}},
+            "motion": {"type": "constant", "speed": 4.0},
+            "model": {"theory": "consistent_linear"},
+            "loads": {"distributed": gusts},
+            "initial": {"state": "undeformed"},
+            "mesh": {"elements": 2},
+            "time": {"end": 30.0, "step": 0.03},
+        }
+    )
+    finer = asked.replace({"time.scheme": "esdirk4", "output.error": False})
+    undamped = finer.replace({"structure.damping": None})
+    true = distance(tip(rotfem.run(finer)), tip(rotfem.run(undamped)))
+    found = rows_of(asked)["damping"]["estimate"][HISTORY]
+    assert 1 / 3 < found / true < 3
+
+
 def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> None:
     """A drag c per length and velocity makes the damping ratio c/(2 m ω₁) of a beam at rest, ω₁ as above.
 
