@@ -6,6 +6,7 @@ in haste, as most are used for few steps on few cells: that takes half the time.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
@@ -14,6 +15,7 @@ import pytest
 os.environ.setdefault("ROTFEM_HASTE", "1")  # before rotfem is imported, and for the processes that tests start
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each of these would translate the package anew, 0.3 s
 sys.dont_write_bytecode = False
+gc.set_threshold(100_000)  # expressions of UFL are many small objects in use, and looked at for nothing
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
