@@ -33,7 +33,7 @@ _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observ
 APART = {
     "Stepper": _STEPPER,
     "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there", "_curves"),
-    "Companion": ("system", "followed", "output", "interval", "stepper", "further", "state", "waiting"),
+    "Companion": ("system", "followed", "output", "interval", "stepper", "further", "state", "waiting", "_step"),
 }
 
 Tree = dict[str, Any]

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
 from math import hypot
 from typing import Any
 
@@ -171,6 +170,7 @@ class Companion:
         system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
+        self.stepper.observers.append(self._arrived)
         self.further = list(further)
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
@@ -222,8 +222,9 @@ class Companion:
         for companion in self.further:
             companion.finish()
 
-    def _arrived(self, step: Followed, old: State, new: State, leg: Leg) -> None:
+    def _arrived(self, old: State, new: State, leg: Leg) -> None:
         """Compare the outputs at the end of a step and within it, and pass it on."""
+        step = self._step
         self.stepper.arrived(new)
         self.doubled += leg.length if len(step.steps) > 1 else 0.0
         self._compare(new, step.end)
@@ -248,7 +249,7 @@ class Companion:
             return
         stepper, start = self.stepper, self.state
         stepper.follow(step, start)
-        stepper.observers = [partial(self._arrived, step)]
+        self._step = step
         try:
             if start.t == 0.0:
                 start = started(stepper, start, step.leg)

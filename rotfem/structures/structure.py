@@ -265,19 +265,19 @@ class Structure:
         free = self.released
         return [place for place, i in enumerate(self.active) if i not in free]
 
-    def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
+    def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.intp]:
         """Return the local numbers of the unknowns that the clamp holds at nodes, the owned clamped ones if None."""
         return self._numbers(nodes, self._clamped_components())
 
-    def hinged_unknowns(self) -> npt.NDArray[np.int32]:
+    def hinged_unknowns(self) -> npt.NDArray[np.intp]:
         """Return the local numbers of those of owned nodes that the clamp leaves free, in order."""
         held = self._clamped_components()
         return self._numbers(None, [i for i in range(self.size) if i not in held])
 
-    def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.int32]:
+    def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.intp]:
         if nodes is None:
             nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
-        return np.asarray((nodes[:, None] * self.size + np.array(components, dtype=np.int32)).ravel())
+        return np.asarray((nodes[:, None] * self.size + np.array(components, dtype=np.intp)).ravel())
 
     def clamp_conditions(self) -> list[Any]:
         """Return the boundary conditions of the clamp."""
