@@ -31,7 +31,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
-from rotfem.numerics.linear import negative_eigenvalues, surely_negative, symmetric, use_direct_solver
+from rotfem.numerics.linear import negative_eigenvalues, righted, surely_negative, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed, times
 
@@ -273,6 +273,8 @@ def critical_speed(system: Any) -> float | None:
     K_1.diagonalScale(d, d)
     K_2.diagonalScale(d, d)
     K_2.scale(-1.0)
+    if _negative(righted(K_1, -1.0)) != 0:  # of a hinge without a spring round-off makes a stiffness, of any sign
+        K_1 = righted(K_1)
     # nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
     nu = _largest(K_2, K_1, SOON)
     if nu is None:

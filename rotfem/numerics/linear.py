@@ -261,20 +261,25 @@ def negative_eigenvalues(A: Any) -> int:
     return solver.negative
 
 
-def surely_negative(K: Any) -> int | None:
-    """Return how many eigenvalues of a stiffness are negative whatever rounding did to it; None where none are counted.
+def righted(K: Any, sign: float = 1.0) -> Any:
+    """Return a stiffness with what rounding may have taken from it added to its diagonal, or given to it taken away.
 
     The error of an entry is at most ROUNDED √(K_ii K_jj) (`rotfem.numerics.eigenproblem`). Ten entries of a row, as the
     root of their number, err together, so that of K is at most 10 ROUNDED of its diagonal: with that added no
-    eigenvalue that exact arithmetic has positive is negative.
+    eigenvalue that exact arithmetic has positive, or zero, is negative.
     """
+    d, out = K.getDiagonal(), K.copy()
+    d.array[:] *= 1.0 + sign * 10.0 * ROUNDED
+    out.setDiagonal(d)
+    return out
+
+
+def surely_negative(K: Any) -> int | None:
+    """Return how many eigenvalues of a stiffness are surely negative; None where none are counted."""
     if not symmetric(K):
         return None
-    d, righted = K.getDiagonal(), K.copy()
-    d.array[:] *= 1.0 + 10.0 * ROUNDED
-    righted.setDiagonal(d)
     try:
-        return negative_eigenvalues(righted)
+        return negative_eigenvalues(righted(K))
     except ComputationError:
         return None
 

@@ -27,7 +27,7 @@ from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem
 from rotfem.numerics import eigenproblem as pencil
-from rotfem.numerics.linear import transposed
+from rotfem.numerics.linear import negative_eigenvalues, transposed
 from rotfem.results import ModesResult
 
 pytestmark = pytest.mark.usefixtures("unestimated")
@@ -277,6 +277,19 @@ def test_speed_beyond_all_others_is_none(spin_up: Any) -> None:
     section = {"structure.section.EA": 1e11, "structure.section.GA": 3e10}
     scene = spin_up({**section, "model.theory": "consistent_linear", "mesh.elements": 60})
     assert critical_speed(ModalAnalysis(Problem.of(scene).spinning()).system) is None
+
+
+def test_what_a_hinge_leaves_free_has_no_critical_speed(hub_beam: Any) -> None:
+    """Of the turn about it round-off makes the stiffness at rest; spin holds it, and bending alone becomes soft."""
+    hinged = {"structure.hub_radius": 0.5, "structure.root": {"lag_stiffness": 0.0}}
+    scene = hub_beam({**hinged, "model.theory": "consistent_linear", "mesh.elements": 4})
+    system = ModalAnalysis(Problem.of(scene).spinning()).system
+    found = critical_speed(system)
+    assert found is not None
+    for speed, negative in ((1e-3 * found, 0), (0.99 * found, 0), (1.01 * found, 1)):
+        K_1, K_2 = system.stiffness_pieces()
+        K_1.axpy(speed**2, K_2)
+        assert negative_eigenvalues(K_1) == negative
 
 
 def test_stiffening(hub_beam: Any) -> None:
