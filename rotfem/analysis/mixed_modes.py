@@ -111,7 +111,7 @@ class Resultants:
         """
         system = self.system
         self._state.x.array[:] = system.q.x.array
-        rest = M.duplicate()
+        rest = system.A.duplicate()
         if self._rest is not None:
             rest.zeroEntries()
             fem_petsc.assemble_matrix(rest, self._rest, system.bcs, 0.0)

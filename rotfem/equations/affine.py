@@ -46,7 +46,7 @@ class AffineSystem(System):
             self.leave_out(())
 
     def _compile(self) -> Any:
-        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root, self.moving or self.parted)
+        self._decomposed = Pieces(self.model, self.clamped, self.root, self.moving or self.parted)
         self.pieces = self._decomposed.all
         self._constants = self._decomposed.constants
         self.assembled, self.analysed = self._decomposed.assembled, self._decomposed.analysed
@@ -131,7 +131,7 @@ class AffineSystem(System):
                     self._operators[kind] = operators[there[0]]  # as it is, which saves a matrix
                 else:
                     if kind not in self._sums:
-                        self._sums[kind] = self._decomposed.assembler.zero()
+                        self._sums[kind] = self._decomposed.assembler.zero(kind)
                     self._operators[kind] = self._sums[kind]
                     combine(self._sums[kind], operators, c[selected])
                 self._changed, self.settled = True, False

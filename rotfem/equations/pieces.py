@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
@@ -31,7 +32,7 @@ from rotfem.mechanics.theories import Theory, richest
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
-from rotfem.numerics.projection import with_ghosts
+from rotfem.numerics.projection import summed, with_ghosts
 from rotfem.structures.root_reaction import RootReaction
 
 
@@ -127,11 +128,21 @@ def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]
     """Return what each load displaces the linear structure by, local dof arrays."""
     if not loads:
         return []
-    if material is not pieces.material:
+    right = np.array([load.operator.array for load in loads]).T
+    loaded = np.any(right.reshape(-1, pieces.V.dofmap.index_map_bs, len(loads)) != 0.0, axis=(0, 2))
+    moved = np.any(pieces.assembler.coupled[summed(material.comm.tompi4py(), loaded.astype(int)) > 0], axis=0)
+    rows = np.flatnonzero(np.tile(moved, len(right) // len(moved)))
+    if 0 < np.count_nonzero(moved) < len(moved):  # of a flat plate those in its plane
+        numbers = (rows + material.getOwnershipRange()[0]).astype(PETSc.IntType)
+        chosen = PETSc.IS().createGeneral(numbers, material.comm)
+        solver = DirectSolver(material.createSubMatrix(chosen, chosen), symmetric=True)
+    elif material is not pieces.material:
         solver = DirectSolver(material, symmetric=True)
     else:
         solver = pieces.analysed or pieces.material_solver
-    return [*with_ghosts(pieces.V, -solver.solve_all(np.array([load.operator.array for load in loads]).T)).T]
+    out = np.zeros_like(right)
+    out[rows] = -solver.solve_all(right[rows])
+    return [*with_ghosts(pieces.V, out).T]
 
 
 Array = npt.NDArray[np.float64]
@@ -188,8 +199,8 @@ class Pieces:
         analysed: solver of this matrix, if the structure is large and effects are not apart.
     """
 
-    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], root: RootReaction, apart: bool = True):
-        self.model, self.structure, self.bcs, self.clamped, self._apart = model, model.structure, bcs, clamped, apart
+    def __init__(self, model: Model, clamped: npt.NDArray[Any], root: RootReaction, apart: bool = True):
+        self.model, self.structure, self.clamped, self._apart = model, model.structure, clamped, apart
         self.q, self.V = model.structure.k.functions[0], model.structure.V
         self._at_clamp = AtClamp(model, clamped, root)
         self._hinged = self.structure.hinged_unknowns()
@@ -206,7 +217,7 @@ class Pieces:
         purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
         known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
         self._forms |= compiled
-        self.assembler = Assembler(self._forms["K"], self.bcs)
+        self.assembler = Assembler(self._forms["K"], [])
         large = self.assembler.pattern.getSize()[0] > SMALL
         if large:
             self._narrow()
@@ -243,7 +254,11 @@ class Pieces:
         self._set_switches(self.model.switches)
         self._set_constants({e: random.uniform(0.5, 1.5) for name in self.constants for e in self._entries(name)})
         self.prestressed.x.array[:] = random.uniform(0.5, 1.5, len(self.prestressed.x.array))
-        self.assembler.narrow(form for kind, form in self._forms.items() if kind != "f")
+        several: dict[str, list[Any]] = {}
+        for kind, form in self._forms.items():
+            if kind != "f":
+                several.setdefault(kind if kind in "CM" and not self._apart else "K", []).append(form)
+        self.assembler.narrow(several)
         self._set_constants({})
         self.assembled += perf_counter() - started
 
@@ -397,7 +412,7 @@ class Pieces:
         """Return a compiled form as a new PETSc vector (of "f") or matrix, the clamp not held."""
         if kind == "f":
             return assembled(form, self.V, [])
-        return self.assembler(form)
+        return self.assembler(form, kind=kind)
 
     @cached_property
     def material(self) -> Any:

@@ -6,7 +6,7 @@ A kill in the middle, two programs at once, or a damaged cache do no harm.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import basix
@@ -16,7 +16,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import cpp, fem, la
 from dolfinx import jit as dolfinx_jit
-from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.analysis import extract_constants
@@ -35,106 +34,108 @@ SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 class Assembler:
     """Makes PETSc matrices of forms whose entries are all in one pattern.
 
-    On one process the cells' matrices are added up by dolfinx, which takes less than half of PETSc's time, and all
-    matrices share their row and column numbers.
+    The cells' matrices are added up by dolfinx, which takes less than half of PETSc's time. On one process those of a
+    kind share their row and column numbers.
 
     Args:
         form: compiled form that has all entries.
-        bcs: whose unknowns the pattern has diagonal entries of.
 
     Attributes:
         pattern: a matrix with the pattern.
+        coupled: which components of nodes stiffness matrices couple, directly or by others.
     """
 
     def __init__(self, form: Any, bcs: list[Any]):
-        self._own: Any = None
-        self._bcs, self._held = bcs, [bc._cpp_object for bc in bcs]
-        if form.mesh.comm.size == 1:
-            self._own = fem.create_matrix(form, la.BlockMode.expanded)
-            self._entries: Any = np.asarray(self._own.data)
-            self._rows, self._columns = (np.array(x, PETSc.IntType) for x in (self._own.indptr, self._own.indices))
-            size, self._space = (len(self._rows) - 1,) * 2, form._cpp_object.function_spaces[0]
-            self._sizes, self._block, self._comm = size, self._space.dofmap.index_map_bs, form.mesh.comm
-            self._kept: npt.NDArray[np.intp] | None = None
-            self.pattern = self._with(np.zeros(len(self._columns)))
-            return
-        self.pattern = fem_petsc.create_matrix(form)
-        fem_petsc.assemble_matrix(self.pattern, form, bcs)
-        self.pattern.assemble()
+        own = self._own = fem.create_matrix(form, la.BlockMode.expanded)
+        self._held, dofmap = [bc._cpp_object for bc in bcs], form.function_spaces[0].dofmap
+        owned, nodes, self._block = own.index_map(0).size_local, dofmap.index_map, dofmap.index_map_bs
+        self._comm, self._sizes = form.mesh.comm, ((owned, own.index_map(0).size_global),) * 2
+        numbers = nodes.local_to_global(np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32))
+        self._numbers = PETSc.LGMap().create(numbers.astype(PETSc.IntType), bsize=self._block, comm=self._comm)
+        rows = np.array(own.indptr[: owned + 1], PETSc.IntType)
+        columns = own.index_map(1).local_to_global(own.indices[: rows[-1]]).astype(PETSc.IntType)
+        held = [dof for bc in bcs for dof in bc.dof_indices()[0] if dof < owned]
+        at = [rows[dof] + np.searchsorted(own.indices[rows[dof] : rows[dof + 1]], dof) for dof in held]
+        self._diagonal, self._entries = np.array(at, dtype=np.intp), np.asarray(own.data)
+        #: By kind of matrix, that of all others "K": the places of its entries in the whole pattern, rows and columns.
+        self._patterns: dict[str, tuple[Any, Any, Any]] = {"K": (None, rows, columns)}
+        self.pattern, self.coupled = self.zero(), np.ones((self._block, self._block), dtype=bool)
 
     def release(self) -> None:
-        """Give back the memory of a matrix; PETSc assembles what is still to come."""
-        self._own = self._kept = self._entries = None
+        """Give back the memory of a matrix; no form is assembled any more."""
+        self._patterns = {kind: (None, *csr) for kind, (_, *csr) in self._patterns.items()}
+        del self._own, self._entries
 
-    def zero(self) -> Any:
-        """Return a new matrix of zeros, which takes up memory when it is filled."""
-        if self.pattern.comm.size == 1:
-            return self._with(np.zeros(len(self._columns)))
-        A = self.pattern.duplicate()
-        A.zeroEntries()
-        return A
+    def zero(self, kind: str = "K") -> Any:
+        """Return a new matrix of zeros, which on one process takes up memory when it is filled."""
+        return self._with(np.zeros(len(self._pattern(kind)[2])), kind)
 
-    def __call__(self, *several: Any, diagonal: float | None = None, into: Any = None) -> Any:
+    def __call__(self, *several: Any, kind: str = "K", diagonal: float | None = None, into: Any = None) -> Any:
         """Return compiled forms added up as a matrix.
 
         Args:
             several: the forms.
+            kind: of the matrix.
             diagonal: of the rows and columns of what is held, zero otherwise; None where nothing is held.
             into: a matrix that `zero` has made, to be overwritten; a new one if None.
         """
-        if self._own is None:
-            A = self.zero() if into is None else into
-            A.zeroEntries()
-            for form in several:
-                fem_petsc.assemble_matrix(A, form, *(() if diagonal is None else (self._bcs, diagonal)))
-                A.assemble()
-            return A
-        entries = self._assembled(*several, diagonal=diagonal)
-        entries = entries if self._kept is None else entries[self._kept]
+        entries, (kept, *csr) = self._assembled(*several, diagonal=diagonal), self._pattern(kind)
+        entries = entries if kept is None else entries[kept]
         if into is None:
-            return self._with(entries.copy())
-        into.getAttr("__csr__")[2][:] = entries
-        into.stateIncrease()
+            return self._with(entries.copy() if kept is None else entries, kind)
+        if self._comm.size == 1:
+            into.getAttr("__csr__")[2][:] = entries
+            into.stateIncrease()
+        else:
+            into.setValuesCSR(*csr, entries)
+            into.assemble()
         return into
 
-    def narrow(self, several: Iterable[Any]) -> None:
+    def narrow(self, several: Mapping[str, Sequence[Any]]) -> None:
         """Take components of nodes that no form couples out of the pattern, as those of a flat plate in and across it.
 
-        The factor fills in by as much less. On several processes the pattern stays as it is.
+        The factor fills in by as much less.
 
         Args:
-            several: compiled forms; matrices to come have no other entries than theirs.
+            several: compiled forms of each kind of matrix that has its own pattern; "K" has the entries of all.
         """
-        if self._own is None:
-            return
-        block, neighbours = self._block, np.diff(self._rows) // self._block
-        starts = np.append(0, np.cumsum(neighbours)[:-1])
-        there = self._assembled(*several).reshape(-1, block) != 0.0
-        coupled = np.any(np.logical_or.reduceat(there, starts).reshape(-1, block, block), axis=0)
-        coupled |= coupled.T | np.eye(block, dtype=bool)
-        if coupled.all():
-            return
-        component = np.arange(len(neighbours)) % block
-        self._kept = np.flatnonzero(coupled[np.repeat(component, neighbours)])
-        self._rows = np.append(0, np.cumsum(neighbours * coupled.sum(axis=1)[component])).astype(PETSc.IntType)
-        self._columns = self._columns[self._kept]
-        self.pattern = self._with(np.zeros(len(self._columns)))
+        (_, rows, columns), block = self._patterns["K"], self._block
+        neighbours = np.diff(rows) // block
+        starts, component = np.cumsum(neighbours) - neighbours, np.arange(len(neighbours)) % block
+        coupled = {}
+        for kind, those in several.items():
+            there = np.logical_or.reduceat(self._assembled(*those).reshape(-1, block) != 0.0, starts)
+            here = np.any(there.reshape(-1, block, block), axis=0)
+            coupled[kind] = np.any(self._comm.allgather(here | here.T | np.eye(block, dtype=bool)), axis=0)
+        self.coupled = np.linalg.matrix_power(coupled["K"].astype(int), block) > 0
+        coupled["K"] = np.any(list(coupled.values()), axis=0)
+        for kind, those in coupled.items():
+            kept = np.flatnonzero(those[np.repeat(component, neighbours)])
+            ends = np.append(0, np.cumsum(neighbours * those.sum(axis=1)[component])).astype(PETSc.IntType)
+            self._patterns[kind] = kept, ends, columns[kept]
+        self.pattern = self.zero()
 
     def _assembled(self, *several: Any, diagonal: float | None = None) -> Any:
-        """Return the entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
+        """Return the owned entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
         A, held = self._own._cpp_object, [] if diagonal is None else self._held
         self._entries.fill(0.0)
         for form in several:
             code = form._cpp_object
             cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), held)
+        if self._comm.size > 1:
+            self._own.scatter_reverse()
         if diagonal is not None:
-            cpp.fem.insert_diagonal(A, self._space, held, diagonal)
-        return self._entries
+            self._entries[self._diagonal] = diagonal
+        return self._entries[: self._own.indptr[self._sizes[0][0]]]
 
-    def _with(self, entries: npt.NDArray[np.float64]) -> Any:
-        csr = (self._rows, self._columns, entries)
+    def _pattern(self, kind: str) -> tuple[Any, Any, Any]:
+        return self._patterns.get(kind, self._patterns["K"])
+
+    def _with(self, entries: npt.NDArray[np.float64], kind: str) -> Any:
+        csr = (*self._pattern(kind)[1:], entries)
         A = PETSc.Mat().createAIJWithArrays(self._sizes, csr, comm=self._comm)
         A.setBlockSize(self._block)  # which `createAIJWithArrays` does not heed
+        A.setLGMap(self._numbers)
         A.assemble()
         return A
 

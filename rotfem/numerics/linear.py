@@ -36,12 +36,14 @@ SINGULAR = "the tangent is singular: the factorisation met a zero pivot"
 
 
 def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
-    """Return Σ weight · matrix, its sparse part in target; all share one pattern, and one of them may have B Bᵀ."""
-    out = target
+    """Return Σ weight · matrix, its sparse part in target, which has all their entries; one of them may have B Bᵀ."""
+    out, there, structures = target, target.getInfo()["nz_used"], PETSc.Mat.Structure
     target.zeroEntries()
     for A, weight in zip(matrices, weights, strict=True):
         if weight != 0.0:
-            target.axpy(weight, sparse_part(A), PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            part = sparse_part(A)
+            same = part.getInfo()["nz_used"] == there
+            target.axpy(weight, part, structures.SAME_NONZERO_PATTERN if same else structures.SUBSET_NONZERO_PATTERN)
             out = PlusLowRank(target, A.part, weight * A.factor) if isinstance(A, PlusLowRank) else out
     return out
 

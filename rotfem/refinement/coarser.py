@@ -48,7 +48,9 @@ class OtherMesh:
         return difference + error_of(difference, self.order, 1.0 / self.ratio)
 
 
-def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: bool = False) -> OtherMesh | None:
+def on_other_mesh(
+    problem: Problem, system: Any, moving: bool = True, finer: bool = False, alone: bool = False
+) -> OtherMesh | None:
     """Return a problem on half the cells or a finer mesh, without what its own system leaves out.
 
     Half the cells will do where all are longer there. Where the nodes that a section, a mass or a load asks for fix
@@ -60,14 +62,16 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: boo
         system: the problem's system on its own mesh.
         moving: whether the other one will be stepped in time.
         finer: whether only a finer mesh will do.
+        alone: whether each process is to have the whole of it.
     """
     problem = problem.replace(outputs={})
     nodes, cells = system.V.dofmap.index_map.size_global, _cells(system)
+    comm = MPI.COMM_SELF if alone else system.comm
     for mesh, ratio, most in _meshes(problem, cells):
         if ratio == 1.0 or (finer and ratio > 1.0):
             continue
         try:
-            other = compile_system(problem.replace(mesh=mesh), system.comm, moving, system.held.parted)
+            other = compile_system(problem.replace(mesh=mesh), comm, moving, system.held.parted)
             if system.held.left_out:
                 other.leave_out(system.held.left_out)
         except InputError:
@@ -152,5 +156,5 @@ def interpolation(V: Any, points: Array) -> Any:
         X = mesh.geometry.cmap.pull_back(points[same, : mesh.geometry.dim], corners)
         values[same] = element.tabulate(0, X)[0, :, :, 0]
     ends = np.arange(len(points) + 1) * dofs.shape[1]
-    shape = len(points), V.dofmap.index_map.size_local
+    shape = len(points), len(V.tabulate_dof_coordinates())
     return scipy.sparse.csr_matrix((values.ravel(), dofs.ravel(), ends), shape)

@@ -29,10 +29,9 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import richest
-from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.linear import SMALL
 from rotfem.numerics.newton import Newton
-from rotfem.numerics.projection import summed
+from rotfem.numerics.projection import summed, with_ghosts
 from rotfem.refinement.coarser import interpolation, on_other_mesh
 
 Array = npt.NDArray[Any]
@@ -51,7 +50,7 @@ class FrequencyErrors:
     Attributes:
         there: analysis of the problem on another mesh or in that theory; None where there is nothing to compare with.
         values: λ there, at the speed of the last call.
-        carried: their vectors at the nodes of the analysed mesh, without the hub; None on several processes.
+        carried: their vectors at the nodes of the analysed mesh, without the hub; None where it has others.
     """
 
     def __init__(self, analysis: ModalAnalysis, richer: Problem | None = None):
@@ -61,8 +60,10 @@ class FrequencyErrors:
         self.carried: Array | None = None
         self._speed: float | None = None
         self._before: Spinning | None = None
-        #: Values at the nodes of the analysed mesh by those of the other one; difference of a frequency ↦ its error.
+        #: Values at the nodes of the analysed mesh by those of the other one; square roots of x^H M x there;
+        #: difference of a frequency ↦ its error.
         self._weights: Any = None
+        self._sizes: Array = np.empty(0)
         self._error: Callable[[float], float] = float
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
@@ -102,8 +103,11 @@ class FrequencyErrors:
             return False
         self.values = self._before.pairs.values
         if self._weights is not None:
-            shapes = there.right(self._before)[: self._weights.shape[1] * self.analysis.structure.size]
-            columns = shapes.reshape(self._weights.shape[1], -1)
+            V, clamped, size = there.system.V, self._before.clamped, self.analysis.structure.size
+            shapes = there.right(self._before)[: V.dofmap.index_map.size_local * size]
+            energies = summed(there.comm, np.sum(shapes.conj() * clamped.apply(clamped.M, shapes), axis=0))
+            self._sizes = np.sqrt(np.maximum(np.abs(energies), 1e-300))
+            columns = with_ghosts(V, shapes).reshape(self._weights.shape[1], -1)
             self.carried = (self._weights @ columns).reshape(-1, shapes.shape[1])
         if len(self.values) + int(there.free) < count:
             return False
@@ -114,17 +118,18 @@ class FrequencyErrors:
         own = self.analysis
         system: Any = None
         if self.richer is None:
-            other = on_other_mesh(own.problem, own.system, moving=False)
+            # Half the cells of a plate, whole on each of up to four processes, are no more than their part of its own.
+            other = on_other_mesh(own.problem, own.system, moving=False, alone=own.comm.size <= 4)
             if other is None:
                 return None
             system, self._error = other.system, other.error
             problem = own.problem.replace(mesh=system.model.problem.mesh)
         else:
             problem = self.richer.replace(outputs={})
-        there = ModalAnalysis(problem, own.about, own.newton, own.comm, system)
-        there.past_limits = own.past_limits
-        if own.comm.size == 1:
-            self._weights = interpolation(there.system.V, own.system.V.tabulate_dof_coordinates())
+        there = ModalAnalysis(problem, own.about, own.newton, own.comm if system is None else system.comm, system)
+        there.past_limits, V = own.past_limits, own.system.V
+        weights = interpolation(there.system.V, V.tabulate_dof_coordinates()[: V.dofmap.index_map.size_local])
+        self._weights = weights if all(own.comm.allgather(weights is not None)) else None
         return there
 
     def _matched(self, spinning: Spinning) -> Array:
@@ -132,10 +137,8 @@ class FrequencyErrors:
         values, carried = self.values, self.carried
         apart = np.abs(values[None, :] - spinning.pairs.values[:, None])
         if carried is not None:
-            alike = np.abs(self.analysis.mass_times(spinning)[: len(carried)].conj().T @ carried)
-            M = self.analysis.system.held.matrix(0.0, 0.0, 1.0, 0.0)
-            size = np.abs(np.sum(carried.conj() * Pencil(M, M, M).apply(M, carried), axis=0))
-            alike /= np.sqrt(np.maximum(size, 1e-300))
+            products = self.analysis.mass_times(spinning)[: len(carried)].conj().T @ carried
+            alike = np.abs(summed(self.analysis.comm, products)) / self._sizes
             # as much alike are shapes within 25 degrees of the mode
             apart[alike < 0.9 * np.max(alike, axis=1, keepdims=True)] = np.inf
         return np.asarray(values[np.argmin(apart, axis=1)])
