@@ -169,7 +169,8 @@ def test_a_companion_stays_clamped() -> None:
         "mesh": {"elements": 4},
         "time": {"end": 1.4, "step": 0.01, "scheme": "radau5"},
     }
-    run, exact = (rotfem.run({**tables, "mesh": {"elements": n}}) for n in (4, 12))
+    run = rotfem.run(tables)
+    exact = rotfem.run({**tables, "mesh": {"elements": 12}, "output": {"error": False}})
     true = off(tip(run), tip(exact))
     assert 0.5 * true < run.summary["error"]["space"] < 4**3 * true
 

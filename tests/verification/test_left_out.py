@@ -17,6 +17,8 @@ from rotfem.scene.plates import PlateStructure
 from rotfem.scene.root import SpatialRoot, Support
 from rotfem.structures.symmetry import inactive_unknowns
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 BEAM: dict[str, Any] = {
     "type": "spatial_beam",
     "length": 10.0,

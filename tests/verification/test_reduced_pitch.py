@@ -9,6 +9,8 @@ import pytest
 
 import rotfem
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 L = 2.0
 SECTION = {
     **{"EA": 1e7, "GA2": 1e6, "GA3": 1e6, "GJ": 2e3, "EI2": 5e2, "EI3": 4e3},

@@ -13,6 +13,8 @@ import rotfem
 from rotfem.results.files import read_csv
 from tests.beams import SPIN_UP, STRUCTURE
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 #: M (N·m) along the Reissner beam in its spin-up, computed without finite elements (see the README.md there).
 REFERENCE = Path(__file__).resolve().parents[1] / "reference" / "spin_up_moment.csv"
 PLACES = [0.0, 0.7, 2.5, 5.3, 9.1, 10.0]
