@@ -168,19 +168,13 @@ def _shares(shares: list[float]) -> str:
     return ", ".join(f"{share:.6g}" for share in shares)
 
 
-def gravity_turns(problem: Problem) -> bool:
-    """Return whether gravity has a component across the spin axis, which turns in the rotating frame."""
-    across = np.cross(problem.loads.gravity, problem.motion.axis)
-    return bool(np.any(across) and problem.motion.is_spinning and "gravity" in problem.effective_effects())
-
-
 def check_steady(problem: Problem) -> None:
     """Refuse what has no steady state in the rotating frame: gravity that turns with it.
 
     Raises:
         InputError: gravity has a component across the spin axis while the frame spins.
     """
-    if gravity_turns(problem):
+    if problem.gravity_turns:
         raise InputError(
             "loads.gravity",
             list(problem.loads.gravity),

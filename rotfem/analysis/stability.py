@@ -23,7 +23,6 @@ import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.analysis.equilibrium import gravity_turns
 from rotfem.analysis.load_steps import LoadFactors, balance
 from rotfem.analysis.modal import GROWTH
 from rotfem.equations.compiled import with_all_unknowns
@@ -216,7 +215,7 @@ def are_constant(problem: Problem) -> bool:
     """Return whether speed, base acceleration, loads and gravity are constant in a frame that turns with the hub."""
     motion, applied = problem.motion, problem.loads.named.values()
     turning = problem.frame == "rotating" and motion.hub is None
-    return turning and motion.constant and all(load.constant for load in applied) and not gravity_turns(problem)
+    return turning and motion.constant and all(load.constant for load in applied) and not problem.gravity_turns
 
 
 def act_at_start(problem: Problem) -> bool:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.equilibrium import gravity_turns
 from rotfem.errors import InputError
 from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term
 from rotfem.mechanics.motion import Motion
@@ -81,7 +80,7 @@ def _harmonic(harmonic: Any, motion: Any) -> Term:
 
 
 def frozen_inputs(problem: Problem) -> list[str]:
-    """Return warnings where what is computed at one time, as modes are, has pitch, gravity and loads as at t = 0."""
+    """Return warnings where what is computed at one time, as modes are, has motion, gravity and loads as at t = 0."""
     given = {name: load.unpitched or load for name, load in problem.loads.named.items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
@@ -89,10 +88,12 @@ def frozen_inputs(problem: Problem) -> list[str]:
 
 
 def frozen_in_frame(problem: Problem) -> list[str]:
-    """Return the same of pitch and gravity."""
+    """Return the same of pitch, gravity and base acceleration."""
+    motion = problem.motion
     found = {
-        "structure.root.pitch changes with time": problem.motion.pitch is not None,
-        "loads.gravity turns in the rotating frame": gravity_turns(problem),
+        "structure.root.pitch changes with time": motion.pitch is not None,
+        "loads.gravity turns in the rotating frame": problem.gravity_turns,
+        "motion.base_acceleration changes with time": motion.is_accelerated and motion.base_knots != (),
     }
     return [f"{what}: taken as at t = 0" for what, there in found.items() if there]
 

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
@@ -109,8 +110,8 @@ class Problem(ProblemData):
 
         Raises:
             InputError: neither step nor tolerance, or both, or one that is not positive; a tolerance for a scheme
-                that does not estimate its error; a start of another mesh; a mesh or a section that cannot be computed
-                with.
+                that does not estimate its error; a start of another mesh; supports that differ by direction; a mesh or
+                a section that cannot be computed with.
             ComputationError: a step failed, however short.
         """
         given = {"end": end, "step": step, "tolerance": tolerance}
@@ -118,6 +119,7 @@ class Problem(ProblemData):
         scheme = scheme or scheme_of(time)
         if tolerance is not None and not estimates_error(type(scheme)):
             raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
+        check_rotating(self, "a history")
         system = self.system(comm=comm)
         march = March(system, scheme, Steps.of(time), Newton(), first_shape(system, start))
         return (Moment(system, state) for state in march)
@@ -130,12 +132,14 @@ class Problem(ProblemData):
             comm: communicator the structure is distributed over.
 
         Raises:
-            InputError: gravity across the axis, with which there is none; a mesh or a section as for `system`.
+            InputError: gravity across the axis or supports that differ by direction, with which there is none; a mesh
+                or a section as for `system`.
             ComputationError: no equilibrium was reached; says how far the load got.
         """
         speed = self._speed(speed)
         still = self.replace(frame="rotating", motion=self.motion.at_speed(speed))
         check_steady(still)
+        check_rotating(still, "a steady state")
         system = still.system(moving=False, comm=comm)
         q = steady_state(system, speed, Newton())
         return Moment(system, State.at_rest(system, q))

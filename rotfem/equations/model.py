@@ -284,8 +284,7 @@ class Model:
     @cached_property
     def closed(self) -> bool:
         """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""
-        motion, gravity = self.motion, np.asarray(self.problem.loads.gravity)
-        turning = motion.is_spinning and bool(np.any(np.cross(gravity, motion.axis)))
+        motion, turning = self.motion, self.problem.gravity_turns
         steady = all(load.is_zero or load.constant for load in self.problem.loads.named.values())
         dead = all(load.dead and load.conservative for load in self.mechanics.loads)
         known = all(e.work is None or e.momentum or e.passive or e.potential is not None for e in self.acting.values())

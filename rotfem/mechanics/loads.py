@@ -97,7 +97,7 @@ class Term:
         table = np.asarray(rows, dtype=float)
         t, values = np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1:])
         if not np.any(np.ptp(values, axis=0)):
-            return cls(replace(shapes, values=np.einsum("k,ksc->sc", values[0], shapes.values)[None]), knots=tuple(t))
+            return cls(replace(shapes, values=np.einsum("k,ksc->sc", values[0], shapes.values)[None]))
         lengths = np.where(np.diff(t) > 0.0, np.diff(t), 1.0)
 
         def amplitudes(s: Array) -> Array:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work
 from rotfem.mechanics.loads import Loads
@@ -15,6 +17,9 @@ from rotfem.mechanics.theories import Theory
 from rotfem.registry import Registry
 from rotfem.registry import outputs as registered
 from rotfem.short import short_fields
+
+#: Part of a vector across an axis that it is along all the same, to the digits that people type.
+ALONG = 1e-6
 
 #: mechanics ↦ functional of the motion, a UFL form without arguments; see `rotfem.mechanics.work.Mechanics`.
 Functional = str | Callable[..., Any]
@@ -106,6 +111,13 @@ class Problem:
         there = (e for e in Effect.registry if self.frame == "rotating" or not e.of_rotation)
         names = (e.name for e in there if e.present(self))
         return tuple(name for name in names if self.effects is None or name in self.effects)
+
+    @property
+    def gravity_turns(self) -> bool:
+        """Whether gravity has a component across the spin axis, which turns in the rotating frame."""
+        g = np.array(self.loads.gravity)
+        across = np.linalg.norm(np.cross(g, self.motion.axis)) > ALONG * np.linalg.norm(g)
+        return bool(across and self.motion.is_spinning and "gravity" in self.effective_effects())
 
     def spinning(self) -> Self:
         """Return the problem of a structure that spins at a speed to be given, as in a sweep over speeds."""

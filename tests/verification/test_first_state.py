@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rotfem
+from rotfem.analysis.equilibrium import check_steady
 
 L = 10.0
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
@@ -107,6 +108,32 @@ def test_modes_are_about_what_a_history_starts_with() -> None:
 def test_a_steady_state_refuses_gravity_that_turns() -> None:
     with pytest.raises(rotfem.SceneError, match="loads.gravity"):
         rotfem.run(scene({}, loads={"gravity": [0.0, -9.81]}) | {"time": None})
+
+
+def test_a_base_acceleration_over_time_is_frozen_at_the_start() -> None:
+    """Modes and steady states say so of one that changes, and not of one that does not."""
+    said = "motion.base_acceleration changes with time: taken as at t = 0"
+    for change, there in ((1.0, True), (0.0, False)):
+        table = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0 + change]]
+        held = scene({}, model={"theory": "linear"}, motion=SPIN | {"base_acceleration": table}) | {"time": None}
+        for verb in (rotfem.run, rotfem.modes):
+            assert (said in verb(held).summary.get("warnings", [])) is there
+
+
+def test_gravity_along_a_tilted_axis_does_not_turn() -> None:
+    """Its direction is that of the axis to round-off, or to the digits that it is typed with."""
+    section = {"EA": 1e6, "GA2": 1e5, "GA3": 1e5, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0}
+    blade = {"type": "spatial_beam", "length": 1.0, "section": section}
+
+    def check(axis: Any, gravity: Any) -> None:
+        tables = scene({}, structure=blade, motion=SPIN | {"axis": list(axis)}, loads={"gravity": list(gravity)})
+        check_steady(rotfem.Problem.of(tables))
+
+    for axis in np.random.default_rng(1).normal(size=(20, 3)):
+        check(axis, 9.81 * axis)
+    check([1, 0, 3], [3.102194, 0, 9.306583])
+    with pytest.raises(rotfem.InputError, match="across the spin axis"):
+        check([1, 0, 3], [3.1022, 0, 9.3065])
 
 
 def test_what_starts_without_forces_starts_undeformed() -> None:

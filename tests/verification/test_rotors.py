@@ -272,6 +272,10 @@ def test_bearings_that_differ_by_direction_are_refused_in_the_rotating_frame() -
             compute(scene | {"loads": harmonic})
     with pytest.raises(rotfem.SceneError, match=r"structure\.supports.*change with time"):
         rotfem.modes(scene, sensitivities=True)
+    problem = rotfem.Problem.of(scene)
+    for compute in (problem.steady, lambda: problem.march(end=1.0, step=0.1)):
+        with pytest.raises(rotfem.InputError, match=r"structure\.supports.*change with time"):
+            next(compute())
     scene["structure"]["section"] = scene["structure"]["section"] | {"EI2": 2 * EI}
     with pytest.raises(rotfem.SceneError, match=r"structure\.supports.*need a shaft that does not"):
         rotfem.modes(scene)
