@@ -50,7 +50,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         root = np.array(getattr(structure, "root_position", (structure.hub_radius, 0.0, 0.0)))
         axis = np.array(scene.motion.axis) / np.linalg.norm(scene.motion.axis)
         center = np.array(body.first_moment / body.mass)
-        columns = columns_of(structure)
+        columns = columns_of(model.structure)
         found: dict[str, Any] = {
             **summary("check", scene, comm, model.structure.mesh.comm),
             "type": structure.type,

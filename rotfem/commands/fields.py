@@ -137,26 +137,22 @@ def central_properties(stiffness: Array, mass: Array) -> dict[str, Array]:
     }
 
 
-def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
-    """Return (r, T) in the frame: position of the axis (m), (n, 3), and the section axes as columns, (n, 3, 3)."""
-    coned = Rotation.from_euler("Y", -beam.precone)
+def axes_along(beam: Any, x: Array, root: Rotation) -> Array:
+    """Return the section axes of a beam's data as columns, (n, 3, 3), in the frame in which its root is turned so."""
     line = beam.reference_line
-    if line is not None:
-        position, (chi, zeta) = line.at(x)[0], line.angles(x)
-    else:
-        chi = zeta = np.zeros(len(x))
-        position = x[:, None] * np.eye(3)[0]
+    chi, zeta = line.angles(x) if line is not None else np.zeros((2, len(x)))
     turned = Rotation.from_euler("ZYX", np.column_stack([chi, -zeta, evaluate(beam.pretwist, x)]))
-    return np.array(beam.root_position) + coned.apply(position), (coned * turned).as_matrix()
+    return np.asarray((root * turned).as_matrix())
 
 
-def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
-    """Return columns over `x` (m) of a beam, at places (m) or the rows of its tables; none of another structure.
+def columns_of(beam: Any, at: Array | None = None) -> dict[str, Array]:
+    """Return columns over `x` (m) of a discretised beam, at places (m) or the rows of its tables; none of others.
 
     Of a spatial beam `axis_1` … `axis_3` say where its axis runs in the frame (m), `t1_1` … `t3_3` are components of
     the section axes there, `pretwist` is their angle (rad), and the rest is `central_properties`; of a planar beam they
     are its section.
     """
+    structure = beam.data
     section = getattr(structure, "section", None)
     if section is None:
         return {}
@@ -167,7 +163,7 @@ def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
     x = at
     if structure.is_planar:
         return {"x": x, **section.at(x)}
-    r, T = axes_along(structure, x)
+    r, T = beam.places({"x": x}), axes_along(structure, x, beam.root_turned)
     matrices = section.at(x)
     return {
         "x": x,
@@ -189,7 +185,7 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
     points, triangles = structure.places(shape), structure.surface()
     if triangles is not None:
         return Surface.of_plate(points, triangles, structure.length)
-    c = columns_of(structure.data, shape["x"])
+    c = columns_of(structure, shape["x"])
     stiffnesses = ("EI", "EI") if structure.data.is_planar else ("EI3", "EI2")
     halves = [HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))[:, None] for EI in stiffnesses]
     axes = [

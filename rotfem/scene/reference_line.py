@@ -162,7 +162,7 @@ class SweptLine:
         places = np.atleast_1d(np.asarray(x, dtype=np.float64))
         side = places if near is None else np.atleast_1d(np.asarray(near, dtype=np.float64))
         rows = np.array(self.rows)
-        row = np.clip(np.searchsorted(rows[:, 0], side) - 1, 0, len(rows) - 2)
+        row = np.clip(np.searchsorted(rows[:, 0], side, side="right") - 1, 0, len(rows) - 2)
         (a, first), (b, last) = rows[row].T, rows[row + 1].T
         span = np.where(b > a, b - a, 1.0)
         return first + (last - first) * (places - a) / span, np.zeros(len(places))

@@ -27,6 +27,7 @@ import ufl
 from basix.ufl import element
 from dolfinx import fem
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 from ufl import cross
 
 from rotfem.errors import InputError
@@ -281,12 +282,16 @@ class SpatialBeam(Beam):
         pairs = list(zip(components, self._triad, strict=True))
         return self._from_reference(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
 
+    @property
+    def root_turned(self) -> Rotation:
+        """The turn of axes at the root by precone and first pitch, numbers as in `_undeformed_triad`."""
+        return Rotation.from_euler("YX", [-self.data.precone, self._first_pitch])
+
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed axis are in the frame, (n, 3) in m, by their coordinates."""
         x, line = coordinates["x"], self.data.reference_line
-        c, s = np.cos(self.data.precone), np.sin(self.data.precone)
         along = np.column_stack([x, np.zeros((len(x), 2))]) if line is None else line.at(x)[0]
-        return np.asarray(self.data.root_position + along @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
+        return np.asarray(self.data.root_position + self.root_turned.apply(along))
 
     def oriented(self, values: Array) -> Array:
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import rotfem
 from rotfem.scene import Scene
@@ -79,6 +80,24 @@ def test_columns_are_those_given_whatever_the_way() -> None:
     np.testing.assert_allclose(c["axis_1"], radius * np.sin(c["x"] / radius), atol=1e-12)
     np.testing.assert_allclose(c["axis_2"], radius * (1 - np.cos(c["x"] / radius)), atol=1e-12)
     assert found.warnings == []
+
+
+def test_pitch_turns_a_bent_blade_at_its_root() -> None:
+    # Uniform, and kinked at .5: centres of mass of axis and bodies are one; t2 at the root, and t1 beyond the kink.
+    section = {"EA": 1e3, "GA2": 1e3, "GA3": 1e3, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 2.0}
+    sweep, beta, pitch = [[0, 0], [0.5, 0], [0.5, 0.6], [1, 0.6]], 0.2, 0.5
+    beam = {"type": "spatial_beam", "length": 1.0, "section": section, "sweep": sweep, "precone": beta}
+    cone = np.array([[np.cos(beta), 0, -np.sin(beta)], [0, 1, 0], [np.sin(beta), 0, np.cos(beta)]])
+    across = cone @ [0, np.cos(pitch), np.sin(pitch)]
+    for over_time in (pitch, {"value": pitch - 0.1, "harmonic": {"amplitude": 0.1, "frequency": 1.0}}):
+        found = checked(beam | {"root": {"pitch": over_time}})
+        c = found.columns
+        axis = np.stack([c[f"axis_{i}"] for i in (1, 2, 3)], axis=-1)
+        np.testing.assert_allclose(trapezoid(axis, c["x"], axis=0), found.center_of_mass, atol=1e-12)
+        np.testing.assert_allclose([c[f"t2_{i}"][0] for i in (1, 2, 3)], across, atol=1e-12)
+        beyond = np.cos(0.6) * cone[:, 0] + np.sin(0.6) * across
+        kink = int(np.argmin(np.abs(c["x"] - 0.5)))  # where the outer side counts
+        np.testing.assert_allclose([c[f"t1_{i}"][kink] for i in (1, 2, 3)], beyond, atol=1e-12)
 
 
 def test_plate() -> None:

@@ -111,7 +111,10 @@ def test_kinked_line_is_the_kinked_sweep() -> None:
     line = [[0.0, 0.0, 0.0], corner, corner, end]
     case = scene({"line": line}, 3.0)
     assert beam(case).knots == pytest.approx((1.4,))
-    np.testing.assert_allclose(found(case), found(scene({"length": 2.0, "sweep": kink}, 3.0)), rtol=1e-9)
+    swept = scene({"length": 2.0, "sweep": kink}, 3.0)
+    np.testing.assert_allclose(found(case), found(swept), rtol=1e-9)
+    for one in (case, swept):  # the outer side is that of the kink itself
+        assert beam(one).reference_line.at(1.4)[1] == pytest.approx(np.array([[np.cos(0.6), np.sin(0.6), 0.0]]))
 
 
 def test_straight_line_is_no_line() -> None:
