@@ -265,11 +265,10 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
         curve = interpolate.make_interp_spline(t, omega, k=1)
     slope, area = curve.derivative(), curve.antiderivative()
     first, last = t[0], t[-1]  # speed and rate are asked for at arrays of times too
-    at_zero = float(area(np.clip(0.0, first, last)) + omega[0] * min(0.0 - first, 0.0))
 
-    def angle(s: float) -> float:
+    def turned(s: float) -> float:
         inside = float(area(np.clip(s, first, last)))
-        return float(inside + omega[0] * min(s - first, 0.0) + omega[-1] * max(s - last, 0.0) - at_zero)
+        return float(inside + omega[0] * min(s - first, 0.0) + omega[-1] * max(s - last, 0.0))
 
     def speed(s: Any) -> Any:
         return curve(np.clip(s, first, last))[()]
@@ -277,7 +276,8 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
     def rate(s: Any) -> Any:
         return np.where((first <= s) & (s < last), slope(np.clip(s, first, last)), 0.0)[()]
 
-    return speed, rate, angle
+    at_zero = turned(0.0)
+    return speed, rate, lambda s: turned(s) - at_zero
 
 
 def from_callable(

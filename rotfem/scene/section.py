@@ -193,6 +193,13 @@ class PlanarSection(Section):
     rotary_inertia: Annotated[NonNegativeProfile, along("kg*m")] | None = None
     second_moment: Annotated[PositiveProfile, along("m**4")] | None = None
 
+    def _check(self) -> None:
+        super()._check()
+        g = self._geometry(np.array(self.knots)) if self.way.name == "shape" else None
+        if g is not None and g.centroid is not None and np.any(np.abs(g.centroid[1]) > ROUND_OFF * np.sqrt(g.area)):
+            why = "has its centroid off the axis, in the plane: a planar_beam has no centres, a spatial_beam has"
+            raise problem("shape", self.shape, why)
+
     @property
     def has_rotary_inertia(self) -> bool:
         """Whether the rotary inertia is positive anywhere."""

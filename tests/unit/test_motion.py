@@ -80,6 +80,14 @@ def test_table_passes_through_its_points_and_is_constant_outside(kind: str) -> N
     assert m.rate(0.2) == m.rate(4.5) == 0.0
 
 
+@pytest.mark.parametrize("kind", ["pchip", "cubic", "linear"])
+@pytest.mark.parametrize("start", [-2.0, -0.5, 1.0])
+def test_the_angle_of_a_table_is_zero_at_the_start(kind: str, start: float) -> None:
+    """Rows that end before t = 0, that reach over it, and that begin after it."""
+    m = motion({"type": "table", "table": [[start, 3.0], [start + 1.0, 3.0]], "interpolation": kind})
+    assert (m.angle(0.0), m.angle(4.0)) == pytest.approx((0.0, 12.0), abs=1e-12)
+
+
 def test_table_from_a_file(tmp_path: Path) -> None:
     (tmp_path / "speed.csv").write_text("t,speed\n0,1\n1,3\n2,4\n")
     tables = copy.deepcopy(BEAM) | {"motion": {"type": "table", "table": "speed.csv", "interpolation": "linear"}}

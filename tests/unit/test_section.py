@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+import rotfem
+from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene import PlanarBeamStructure, Scene, SpatialBeamStructure
 from rotfem.scene.section import PlanarSection, SpatialSection
+from rotfem.scene.section_shapes import Shape, rectangle
 
 MATERIAL = {"E": 210e9, "nu": 0.3, "rho": 7800.0}
 G = 210e9 / 2.6
@@ -157,6 +161,22 @@ def test_incomplete_section_lists_the_possible_sets() -> None:
         planar(EA=1)
     assert "EA, GA, EI, mass_per_length (optional: rotary_inertia)" in str(caught.value)
     assert 'shape = "tube", outer_radius, wall' in str(caught.value)
+
+
+def test_a_planar_beam_refuses_a_centroid_off_its_axis_in_the_plane() -> None:
+    """The height, along axis 3, is in the plane: a centroid at z bends there under axial forces, one at y does not."""
+
+    def moved(nu: Any, width: Any, height: Any) -> Any:
+        return replace(rectangle(nu, width, height), centroid=(width / 2, height - 0.1))
+
+    rotfem.register(Shape("moved", ("width", "height"), moved))
+    try:
+        assert planar(**MATERIAL, shape="moved", width=0.2, height=0.1).at(0.0)["EA"] == pytest.approx(0.02 * 210e9)
+        with pytest.raises(SceneError, match=r"centroid off the axis.*spatial_beam") as caught:
+            planar(**MATERIAL, shape="moved", width=0.2, height=[[0.0, 0.1], [2.0, 0.2]])
+        assert caught.value.key == "structure.section.shape"
+    finally:
+        registry.shapes.remove("moved")
 
 
 def test_section_is_frozen() -> None:
