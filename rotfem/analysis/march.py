@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import reduce
 from itertools import chain, pairwise
 from typing import Any
 
@@ -17,9 +18,9 @@ from rotfem.analysis.time_grid import SHORT, Leg, TimeGrid
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
-from rotfem.numerics import compat
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import ComplexSolver, DirectSolver, combine
 from rotfem.numerics.newton import Newton
+from rotfem.numerics.projection import sparse_part, times, with_ghosts
 
 
 @dataclass(frozen=True)
@@ -145,8 +146,9 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Safety factor, and smallest change of a step.
-SAFETY, SHRINK = 0.9, 0.2
+#: Part of what is allowed that a step's error is led to: that of a vibration of allowed amplitude is allowed |cos φ|, ½
+#: in the geometric mean of its phases. Smallest change of a step.
+AIM, SHRINK = 0.5, 0.2
 
 #: The longest step, and the intervals over which many knots are averaged, as parts of the end. A history is seldom
 #: drawn with more than 2000 points: what changes faster has the same impulse and first moment in every interval.
@@ -220,14 +222,14 @@ class AdaptiveSteps:
             new, ratio = self._tried(state, leg)
             if ratio > 1.0:
                 stepper.rejected += 1
-                wanted, most = leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK), 1.0
+                wanted, most = leg.length * max((ratio / AIM) ** (-1 / order), SHRINK), 1.0
                 if wanted < self.shortest:
                     what = f"the step fell below {self.shortest:.3g} s without meeting the tolerance"
                     helps = ["a looser time.tolerance", "a smaller time.min_step", "some damping"]
                     advice = ", or ".join(helps[: 2 if EFFECT in stepper.system.model.effects else 3])
                     raise ComputationError(what, time=state.t, advice=advice)
                 continue
-            ratio = max(ratio / SAFETY**order, 1e-12)
+            ratio = max(ratio / AIM, 1e-12)
             factor = float(np.clip((ratio * before) ** (-1 / (6 * order)), SHRINK, most))
             most = stepper.scheme.growth
             if leg.length >= wanted or factor < 1.0:
@@ -257,8 +259,7 @@ class AdaptiveSteps:
         self.largest = max(self.largest, self.measure.displacement(new))
         if local is None:  # a fallback has taken it
             return new, 1.0
-        # local errors are estimates, so that the tolerance is divided by 7
-        return new, 7.0 * self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
+        return new, self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
 
     def _next(self, t: float, wanted: float) -> Leg:
         """Return a leg from t (s) that is about as long as wanted and passes no landing."""
@@ -274,37 +275,45 @@ class AdaptiveSteps:
         return Leg(stop, h, lands, (float(self.lines[i, 0]), float(self.lines[i, 1])) if there else None)
 
 
-#: Filters are made for steps in this ratio.
+#: Filters are made for steps in this ratio. They take owned arrays.
 COARSE = 1.5
+Filter = Callable[[Any], Any]
 
 
 class ErrorMeasure:
     """What a step's local error makes of a history: the error at its end if every step were like this one.
 
-    A vibration of frequency ω and amplitude A has a local error of C (ωh)ᵐ A in every step. N such steps add up to N C
-    (ωh)ᵐ A, but never to much more than the vibration itself: what is small need not be resolved. With filters F(τ) =
-    (M + τ C + τ² K)⁻¹ M, which leave a vibration 1/(1 + τ²ω²), the size of the error is the larger of
+    A vibration of frequency ω and amplitude A has a local error e of C (ωh)ᵐ A in every step. N such steps add up to
+    N C (ωh)ᵐ A, but never to more than 2 A, the vibration in opposite phase: what is small need not be resolved. A
+    Butterworth filter B leaves N e where that is below 2 A, half of it where both are equal, and less than 2 A beyond:
 
-        N F(τ₁) … F(τ_k) e    and    F(h) e,    N C (h/τ)ᵐ = 2,
+        B = 1/(1 + (τω)²ⁿ),    N C (h/τ)ᵐ = 2,    n = m/2, rounded up.
 
-    the τ such that N e is left where it is below 2 A, and about 2 A beyond; what is not resolved at all has an e of up
-    to (ωh)² A, of which F(h) leaves A, once: it is damped, or hardly moved. Stiff axial motions, whose e is the largest
-    there is, thus count with their amplitude. So do motions that strong damping C stops within the step: without C
-    their e, of h² a at the start, would be taken for an error (as of any stiff component: Hairer & Wanner 1996, eq.
-    (IV.8.20)).
+    What is not resolved at all has an e of up to (s ωh)² A, of which the filter 1/(1 + (s ωh)²) leaves A, once: it is
+    damped, or hardly moved. The size of the error is the larger of both, taken twice for the half that B leaves. Stiff
+    axial motions, whose e is the largest there is, thus count with their amplitude.
+
+    B is applied as n filters one after the other, for the n roots X of Xⁿ = −1:
+
+        z (z M + τ C + τ²/z K)⁻¹ M e,    z² = −X,    Re z > 0.
+
+    Matrices are those at the start. The angle of a free hub is among the unknowns, as the hub moves with vibrations.
+    With C motions that strong damping stops within the step are filtered too; without it their e, of h² a at the start,
+    would be taken for an error (as of any stiff component: Hairer & Wanner 1996, eq. (IV.8.20)).
 
     Args:
-        system: equations of motion; state and time of the start are set in it where filters are made.
+        system: equations of motion; state and time of the start are set in it.
         scheme: whose local errors are measured.
         end: length of the history, s.
     """
 
     def __init__(self, system: Any, scheme: Scheme, end: float):
         self.inner, self.end, self.scheme = system.held, end, scheme
-        self._e, self._b = (compat.create_vector(self.inner.V) for _ in range(2))
-        self._filtered = Increment(self.inner.V)
-        self._kept: dict[int, list[list[DirectSolver]]] = {}
-        self._mass: Any = None
+        self.inner.set_time(0.0, self.inner.model.problem.motion)  # of a free hub the speed it starts with, not of now
+        self.inner.set_state(self.inner.zeros())
+        self._matrices = system.with_hub(self.inner.mass_damping_stiffness())
+        self._owned = self.inner.V.dofmap.index_map.size_local * self.inner.V.dofmap.index_map_bs
+        self._kept: dict[int, list[list[Filter]]] = {}
 
     def __call__(self, error: Array, h: float) -> float:
         """Return the largest entry of the error, in units of the unknowns' scale.
@@ -318,9 +327,11 @@ class ErrorMeasure:
             while len(self._kept) >= 4:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[length] = self._made(COARSE**length)
-        # what is not resolved is in error by up to 2 A, of which A/2 may remain
-        adds_up, remains = (self.size(self._through(error, filters)) for filters in self._kept[length])
-        return max(self.end / h * adds_up, 3.0 * remains)
+        e = np.full(self._matrices[0].getLocalSize()[0], error[-1])  # the last process has the angle of a hub
+        e[: self._owned] = error[: self._owned]
+        filtered = (reduce(lambda e, through: through(e), filters, e) for filters in self._kept[length])
+        adds_up, remains = (self.size(with_ghosts(self.inner.V, x.real[: self._owned])) for x in filtered)
+        return 2.0 * max(self.end / h * adds_up, remains)
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of a local dof array, in units of their scale."""
@@ -334,28 +345,24 @@ class ErrorMeasure:
             q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
         return self.size(q)
 
-    def _made(self, h: float) -> list[list[DirectSolver]]:
-        """Return the filters of what adds up and of what remains, for steps of h (s), by the matrices at the start."""
+    def _made(self, h: float) -> list[list[Filter]]:
+        """Return the filters of B, and that of what is not resolved, for steps of h (s)."""
         constant, order, lost = self.scheme.estimate
-        # filters in a row turn off less sharply than (1 + (τω)ᵐ)⁻¹ does, so they start earlier
-        slow = 0.85 * (0.5 * constant * self.end / h) ** (1 / order)
-        times = [slow] * (order // 2) + [slow**0.5] * (order % 2)
-        inner = self.inner
-        inner.set_time(0.0, inner.model.problem.motion)  # of a free hub the speed it starts with, not that of now
-        inner.set_state(inner.zeros())
-        self._mass = self._mass or inner.matrix(0.0, 0.0, 1.0, 0.0)
-        made = {tau: DirectSolver(inner.matrix((tau * h) ** 2, tau * h, 1.0, 1.0)) for tau in {lost, *times}}
-        return [[made[tau] for tau in times], [made[lost]]]
+        n, tau = (order + 1) // 2, h * (0.5 * constant * self.end / h) ** (1 / order)
+        B = [self._filter(1.0, tau)] if n % 2 else []
+        for k in range(n - 1, 0, -2):
+            B += 2 * [self._filter(np.exp(0.5j * np.pi * k / n), tau)]
+        return [B, [self._filter(1.0, lost * h)]]
 
-    def _through(self, error: Array, filters: list[DirectSolver]) -> Array:
-        """Return an error after filters, a local array of the structure's unknowns (reused)."""
-        x = error
-        for solver in filters:
-            self._e.array[:] = x[: len(self._e.array)]
-            self._mass.mult(self._e, self._b)
-            self._b.array[self.inner.clamped] = 0.0
-            x = self._filtered.solve(solver, self._b)
-        return x
+    def _filter(self, z: complex, tau: float) -> Filter:
+        """Return a filter; that of a complex z gives the conjugate, so that z̄ is filtered with if it is used again."""
+        (M, C, K), weights = self._matrices, np.array([z, tau, tau**2 / z])
+        if np.isreal(z):
+            real = DirectSolver(combine(sparse_part(M).duplicate(), [M, C, K], weights.real))
+            return lambda e: real.solve_all(times(M, e.real[:, None]))[:, 0]
+        solver = ComplexSolver((M, C, K))
+        solver.factor(list(weights))
+        return lambda e: np.conj(z * solver.solve(times(M, np.stack([e.real, e.imag], axis=1)) @ (1.0, 1.0j)))
 
 
 #: Switches back in the very next step, and steps tried meanwhile, that are a sliding mode. A switch that the motion

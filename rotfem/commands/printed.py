@@ -19,7 +19,9 @@ def report(result: Result) -> list[str]:
     s = result.summary
     tables = [line for table in result.tables() for line in table.lines()]
     before, after = _AROUND[s["command"]](s)
-    error = [error_line(s["error"])] if "error" in s else []
+    known = s.get("scene", {}).get("output", {}).get("error", True)
+    unknown = [] if known else ["error: not estimated, as output.error = false"]
+    error = [error_line(s["error"])] if "error" in s else unknown
     return [*before, *shared(s), *tables, *error, *after]
 
 

@@ -26,6 +26,7 @@ STOP = {"type": "table", "table": [[0.0, 0.2], [1.0033, 0.2], [1.0043, 0.0]], "i
 MOTIONS: dict[str, tuple[dict[str, Any], float]] = {
     "spin-up": ({"motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0}}, 20.0),
     "torque pulse": ({"motion": {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.5, 1.5, 100.0]]}}, 4.0),
+    "light hub": ({"motion": {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.2, 0.7, 40.0]]}}, 2.0),
     "tip release": ({"motion": STILL, "initial": {"tip_displacement": 1.0}}, 5.0),
     "late pulse": ({"motion": STILL, "loads": {"tip_force": {"table": LATE}}}, 63.0),
     "sudden stop": ({"motion": STOP}, 3.0),
@@ -39,7 +40,9 @@ def moved(name: str, **time: Any) -> Any:
 
 #: Fixed steps of Radau's method by which a motion is known to a tenth of the smallest tolerance; where axial vibrations
 #: are struck its error falls with the step only.
-EXACT = {"spin-up": 2_000, "torque pulse": 8_000, "tip release": 40_000, "late pulse": 40_000, "sudden stop": 20_000}
+EXACT = {"spin-up": 2_000, "torque pulse": 8_000, "light hub": 8_000, "sudden stop": 20_000} | dict.fromkeys(
+    ("tip release", "late pulse"), 40_000
+)
 
 
 @cache
@@ -77,6 +80,12 @@ def test_the_usual_scheme() -> None:
 @pytest.mark.parametrize(("name", "tolerance"), [("spin-up", 1e-3), ("sudden stop", 1e-2), ("torque pulse", 1e-2)])
 def test_error_and_steps(name: str, tolerance: float) -> None:
     check(name, tolerance, "esdirk4", 1500)
+
+
+def test_a_light_hub_moves_with_vibrations() -> None:
+    """They are no more than resolved: with the hub held their local errors would count several times as much."""
+    reached = error(moved("light hub", tolerance=1e-2), exact("light hub", 2000))
+    assert 2e-3 < reached < 1e-2
 
 
 @pytest.mark.nightly
@@ -129,8 +138,11 @@ def test_jumps_denser_than_steps_act_by_their_mean() -> None:
 
 
 def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hub held at a speed by a switch slides on its jump in ever shorter steps: said when the pace is known."""
-    monkeypatch.setattr("rotfem.analysis.march.PACE", 100)
+    """A hub held at a speed by a switch slides on its jump in ever shorter steps: said when the pace is known.
+
+    After some 200 of them the switch would be recognised.
+    """
+    monkeypatch.setattr("rotfem.analysis.march.PACE", 50)
     monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 1000)
     switch = {
         "type": "torque",
@@ -144,7 +156,7 @@ def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> 
     assert caught.value.time is not None
 
 
-@pytest.mark.parametrize("damping", [{}, {"kelvin_voigt": 1e4}], ids=str)
+@pytest.mark.parametrize("damping", [{}, {"kelvin_voigt": 1e-3}], ids=str)
 def test_advice_where_steps_are_too_short(damping: dict[str, float]) -> None:
     """Damping is no advice for what has it."""
     tables = {"structure": STRUCTURE | {"damping": damping}, "motion": STILL, "initial": {"state": "undeformed"}}
