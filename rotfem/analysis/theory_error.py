@@ -17,8 +17,12 @@ with K the tangent at q, and G = ∫ N D²Γ_1 the stress stiffness, which the t
 first correction but for the forces C ΔΓ·DΔΓ, which the correction itself relaxes (of a bent line that is not
 foreshortened, the membrane force). Forces on the masses are kept. What these terms do to a frequency is not in it.
 
-A history that begins undeformed has no error at first, and masses keep one from growing: a constant r moves a mass m
-that nothing holds by r t²/2m in the time t. So K + 2M/t² is in the place of K, which bounds what a hinge does at rest.
+A history that starts in balance has the error Δq₀ of that equilibrium at first, and masses keep it from growing: a
+constant force f moves a mass m that nothing holds by f t²/2m in the time t. So
+
+    (K + 2M/t²) Δq = −r + 2M/t² Δq₀,
+
+which bounds what a hinge does.
 """
 
 from __future__ import annotations
@@ -43,6 +47,7 @@ from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import Pencil, RoundOff
 from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.projection import times
 
 Array = npt.NDArray[np.float64]
 
@@ -117,14 +122,17 @@ def is_estimated(system: Any) -> bool:
     return richest().holds_for(kind) and kind in stiffened().prestress
 
 
-def error_of_state(system: Any, q: Array, tips: Array | None = None, time: float = np.inf) -> TheoryError:
+def error_of_state(
+    system: Any, q: Array, tips: Array | None = None, time: float = np.inf, first: Array | None = None
+) -> TheoryError:
     """Return the error of the displacements of a state, whose time is set, by a linear theory with stress stiffness.
 
     Args:
         system: equations of motion, the hub held.
         q: the state, a local dof array.
         tips: sizes that the components of the tip have (m, rad), (components,); those of the state if None.
-        time: that the error has had to grow (s); of an equilibrium it is all there.
+        time: since a state of balance (s); of an equilibrium the error is all there.
+        first: that state, a local dof array; undeformed if None.
     """
     name = system.model.theory.name
     if not is_estimated(system):
@@ -140,9 +148,7 @@ def error_of_state(system: Any, q: Array, tips: Array | None = None, time: float
     small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
     if small:
         return TheoryError(neglected, f"the largest rotation is {rotation:.2g}", name)
-    r = _residual(system, q)
-    K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
-    change = -Increment(system.V).solve(DirectSolver(K), r).copy()
+    change = _correction(system, q, time, None if first is None or not first.any() else first)
     smaller = min(displacement, _sizes(system, q + change)[0])  # of the states before and after
     estimate = _sizes(system, change)[0] / max(smaller, 1e-300)
     if rotation > 1.0:  # expansions in it converge too slowly for an estimate
@@ -202,6 +208,20 @@ def _sizes(system: Any, q: Array) -> tuple[float, float]:
     return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
 
 
+def _correction(system: Any, q: Array, time: float = np.inf, first: Array | None = None) -> Array:
+    """Return Δq of a state a time after another one (see `error_of_state`), a local dof array."""
+    r = _residual(system, q)
+    if first is not None:
+        now = system.time
+        system.set_time(0.0)
+        before = _correction(system, first)
+        system.set_time(now)
+        r.array[:] -= times(system.matrix(0.0, 0.0, 2.0 / time**2, 0.0), before[: len(r.array), None])[:, 0]
+    system.set_state(q)
+    K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
+    return -Increment(system.V).solve(DirectSolver(K), r).copy()
+
+
 def _residual(system: Any, q: Array) -> Any:
     """Return r at a state, a PETSc vector, zero at clamped unknowns; the state is set."""
     model, k, test = system.model, system.structure.k, ufl.TestFunction(system.V)
@@ -228,32 +248,36 @@ class Farthest:
 
     Attributes:
         seen: largest component of displacements over the length or of rotations (rad), time (s) and state.
+        first: the first state.
     """
 
     def __init__(self, system: Any):
         self.system = system
         self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
+        self.first: Array | None = None
 
     def __call__(self, q: Array, t: float) -> None:
         """Take note of a state (local dof array) of time t (s)."""
         if not self.system.linear:
             return
+        self.first = np.array(q) if self.first is None else self.first
         size = float(np.max(self.system.sizes(q), initial=0.0))
         if size > 1.02 * self.seen[0]:  # so that not every state of a growing motion is copied
             self.seen = (size, t, np.array(q))
 
-    def error(self, system: Any, tips: Array | None, from_rest: bool) -> TheoryError | None:
+    def error(self, system: Any, tips: Array | None, in_balance: bool) -> TheoryError | None:
         """Return the error of a theory there; None where that fails. State and time of its system stay.
 
         Args:
             system: of the theory, on the mesh of the motion.
             tips: largest size of every component of the tip in the motion (m, rad); those of the state if None.
-            from_rest: whether the motion began undeformed, without an error.
+            in_balance: whether it is a motion that began at rest, in balance or undeformed.
         """
-        held, time = system.held, self.seen[1] if from_rest else np.inf
+        held, time = system.held, (self.seen[1] if in_balance else 0.0) or np.inf
         if not is_estimated(held):
             return error_of_state(held, held.zeros())
-        return self._there(held, partial(error_of_state, held, tips=tips, time=time))
+        first = None if self.first is None or time == np.inf else self.first[: len(held.q.x.array)]
+        return self._there(held, partial(error_of_state, held, tips=tips, time=time, first=first))
 
     def conditioning(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that is unknown."""

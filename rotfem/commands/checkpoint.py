@@ -111,7 +111,7 @@ class Memory:
             "factored": self.system.held.factored,
             "stepper": of_stepper(self.stepper),
             "monitor": {name: getattr(self.monitor, name) for name in ("since", "stability")},
-            "farthest": self.monitor.farthest.seen,
+            "farthest": (self.monitor.farthest.seen, self.monitor.farthest.first),
             "companions": [of_companion(companion) for companion in self.companions],
             "snapshots": None if snapshots is None else vars(snapshots),
         }
@@ -150,7 +150,7 @@ class Memory:
         self.system.held.factored_before = tree["factorisations"] - self.system.held.factorisations
         vars(self.log).update(tree["log"], elapsed=tree["elapsed"])
         vars(self.monitor).update(own["monitor"])
-        self.monitor.farthest.seen = own["farthest"]
+        self.monitor.farthest.seen, self.monitor.farthest.first = own["farthest"]
         put_back_stepper(stepper, own["stepper"], state)
         for companion, known in zip(self.companions, own["companions"], strict=True):
             put_back_companion(companion, known)

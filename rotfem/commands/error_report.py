@@ -103,11 +103,10 @@ class RunErrors:
             return None
         names, moves = self.system.structure.components, self.system.structure.moves
         tips = np.array([np.max(np.abs(self.history[f"tip_{name}"])) for name in names])
-        initial = self.scene.initial
-        from_rest = self.scene.time is not None and initial.state == "undeformed" and initial.first is None
+        in_balance = self.scene.time is not None and self.scene.initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self._drifting(self.monitor.farthest.error(self.system, tips, from_rest))
+            return self._drifting(self.monitor.farthest.error(self.system, tips, in_balance))
         try:
             found = self._apart(richer) if self.wanted else None
         except (ComputationError, InputError):
@@ -118,7 +117,7 @@ class RunErrors:
         if self.shape is not None and self._buckles(system):
             why = "it is above a buckling load that this theory does not have"
             return TheoryError(1.0, why, self.problem.theory.name)
-        base = self.monitor.farthest.error(system, tips, from_rest)
+        base = self.monitor.farthest.error(system, tips, in_balance)
         if base is None:
             return None
         sizes = tips[moves]

@@ -132,6 +132,27 @@ def test_history_that_leaves_the_range() -> None:
         assert any("model.theory" in line for line in summary["warnings"]) is noticed
 
 
+@pytest.mark.parametrize(
+    ("hinged", "loads"),
+    [
+        (True, {"tip_force": {"table": [[0, 0, 0], [0.1, 0, 1.0], [0.2, 0, 0]]}}),
+        (False, {"tip_force": [0.0, UNIT], "at": [{"x": 5.0, "force": {"table": [[0, 0, 0], [0.1, 0, 50.0]]}}]}),
+    ],
+    ids=["hinge", "bent at the start"],
+)
+def test_error_since_a_start_in_balance(hinged: bool, loads: dict[str, Any]) -> None:
+    """Masses bound what a hinge does that nothing holds at rest, and the error of the first equilibrium stays."""
+    tables: dict[str, Any] = {"mesh": {"elements": 4}, "time": {"end": 1.0, "step": 0.02}}
+    exact, found = (beam(theory, loads, **tables) for theory in ("reissner", "consistent_linear"))
+    if hinged:
+        for scene in (exact, found):
+            scene["structure"]["root"] = {"lag_stiffness": 0.0}
+    done, there = rotfem.run(found), rotfem.run({**exact, "output": {"error": False}})
+    path = [np.column_stack([r.history["tip_u1"], r.history["tip_u2"]]) for r in (done, there)]
+    true = np.linalg.norm(path[0] - path[1], axis=1).max() / np.linalg.norm(path[1], axis=1).max()
+    assert true / 3 < done.summary["theory_error"]["estimate"] < 3 * true
+
+
 def phase_error(time: float) -> float:
     """Return the largest distance of two unit oscillations, of a first lag frequency with and without stiffening."""
     omega = 3.516015 * np.sqrt(EI / 1.2 / LENGTH**4)
