@@ -213,6 +213,8 @@ class Sweep:
         self.finest = 1e-5 * max(speeds[-1] - speeds[0], 1e-300)  # a narrower veering passes as a crossing
         self.most_solves = min(self.most_solves, 1000 + 41 * len(speeds))  # a veering takes 17
         for i, speed in enumerate(speeds[1:], start=1):
+            if speeds[i - 1] < 0.0 < speed:  # where the lines ω = k|Ω| have a kink
+                self._advance(self.solve(0.0, self.points[-1].spinning, False))
             self._advance(self.solve(speed, self.points[-1].spinning, True))
             progress(i / (len(speeds) - 1))
 

@@ -52,8 +52,13 @@ class Leg:
         return View(-1 if self.lands else 0, self.line)
 
     def doubles(self, after: Leg) -> bool:
-        """Return whether this leg and the one after it may be taken as one: they have no knot in them or between."""
-        return not (self.lands or self.line or after.line)
+        """Return whether this leg and the one after it may be taken as one, in a step of about twice the length.
+
+        They have no knot in them or between, and none is longer than twice the other: a step as long as both has hardly
+        another error than one that is most of it.
+        """
+        shorter, longer = sorted((self.length, after.length))
+        return 2 * shorter >= longer * (1 - CLOSE) and not (self.lands or self.line or after.line)
 
 
 class TimeGrid:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -74,10 +75,17 @@ class RunErrors:
         """Largest displacement of the tip, m."""
         return largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS["tip"])]))
 
+    @property
+    def _turn(self) -> float:
+        """Largest component of the rotation of the tip, rad."""
+        rotations = np.array(self.system.structure.components)[~self.system.structure.moves]
+        return max((float(np.max(np.abs(self.history[f"tip_{name}"]))) for name in rotations), default=0.0)
+
     def estimate(self) -> ErrorEstimate | None:
         """Return the error, relative to the largest value of its output; None if not wanted, or nothing was computed.
 
-        The output is the displacement of the tip, or what `accuracy_of` names.
+        The output is the displacement of the tip, or what `accuracy_of` names. Unknown is that of a displacement which
+        is round-off of rotations; `scale` is 0 then.
         """
         if not self.wanted or not len(self.history["t"]):
             return None
@@ -85,7 +93,9 @@ class RunErrors:
         scale = largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS[of])]))
         contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
-        if self.companions is not None:
+        if of == "tip" and scale < RESOLVED * self._turn * self.system.structure.length:
+            found["scale"] = 0.0
+        elif self.companions is not None:
             contributions = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
         elif self.reduced is not None or self.shape is not None:
@@ -225,10 +235,10 @@ class RunErrors:
             assert time is not None
             factor = min(1.0, NOTICED / 2 / steps)
             if time.tolerance is not None:
-                cures.append(f"time.tolerance = {time.tolerance * factor:.1g}")
+                cures.append(f"time.tolerance = {rounded_down(time.tolerance * factor)}")
             else:
                 step = time.step * factor ** (1 / self.stepper.scheme.order)
-                cures.append(f"time.step = {step:.1g} or shorter")
+                cures.append(f"time.step = {rounded_down(step)} or shorter")
         if mesh >= NOTICED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= NOTICED / 2:
@@ -240,6 +250,8 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
+        if error.found["scale"] == 0.0:
+            return 'the tip is not displaced; accuracy_of = "root_moment" has that of the moment'
         if self.companions is not None and error.contributions["time"] is None:
             if self.companions.steps.sound:
                 return "the prescribed motion or loads allow no steps of twice the length"
@@ -247,6 +259,12 @@ class RunErrors:
         if error.contributions["space"] is None:
             return "there is no other mesh to compare with, or the run failed on it"
         return "the run failed with a more exact theory"
+
+
+def rounded_down(x: float) -> str:
+    """Return a positive number with one digit, not above it."""
+    power = 10.0 ** math.floor(math.log10(x))
+    return f"{math.floor(x / power * (1 + 1e-9)) * power:.1g}"
 
 
 def _relative(apart: float, scale: float) -> float:

@@ -7,9 +7,8 @@ counted on is that of strains, of linear elements that of displacements, 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf, prod
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,12 @@ from rotfem.mechanics.problem import Problem
 from rotfem.refinement.estimate import error_of
 
 Array = npt.NDArray[np.float64]
+
+#: Ratio of cell sizes from which on two meshes are compared: that of three cells to two, half of the least odd number.
+LONGER = 1.5 * (1 - 1e-9)
+
+#: Part of the length within which two vertices are on one line.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -53,9 +58,9 @@ def on_other_mesh(
 ) -> OtherMesh | None:
     """Return a problem on half the cells or a finer mesh, without what its own system leaves out.
 
-    Half the cells will do where all are longer there. Where the nodes that a section, a mass or a load asks for fix
-    some, or there is one cell across, all are halved in length; those of a mesh file have one degree more. None where
-    there is no other mesh at all.
+    Half the cells will do if each is at least 1.5 times as long there. Where nodes that a section, a mass or a load
+    asks for fix some, or there is one cell across, all are halved in length. Where that cannot be either, as of a mesh
+    file, they have one degree more. None where there is no other mesh at all.
 
     Args:
         problem: what is computed.
@@ -64,42 +69,48 @@ def on_other_mesh(
         finer: whether only a finer mesh will do.
         alone: whether each process is to have the whole of it.
     """
-    problem = problem.replace(outputs={})
-    nodes, cells = system.V.dofmap.index_map.size_global, _cells(system)
+    problem, own, degree = problem.replace(outputs={}), lines(system), system.V.element.basix_element.degree
     comm = MPI.COMM_SELF if alone else system.comm
-    for mesh, ratio, most in _meshes(problem, cells):
-        if ratio == 1.0 or (finer and ratio > 1.0):
-            continue
+    for mesh in _meshes(problem, system, finer):
         try:
             other = compile_system(problem.replace(mesh=mesh), comm, moving, system.held.parted)
             if system.held.left_out:
                 other.leave_out(system.held.left_out)
         except InputError:
             continue
-        if other.V.dofmap.index_map.size_global != nodes and _cells(other) < most + 1:
-            return OtherMesh(other, ratio, max(2, system.V.element.basix_element.degree))
+        sizes = lengths(lines(other), own) if mesh.degree == problem.mesh.degree else np.array([0.5])
+        if (least := float(sizes.min())) >= LONGER or sizes.max() <= 1.0 / LONGER:
+            return OtherMesh(other, least if least > 1.0 else float(sizes.max()), max(2, degree))
     return None
 
 
-def _cells(system: Any) -> int:
-    topology = system.structure.mesh.topology
-    return int(topology.index_map(topology.dim).size_global)
+def _meshes(problem: Problem, system: Any, finer: bool) -> list[Any]:
+    """Return meshes that may be compared with that of a problem's system, the preferred one first."""
+    mesh, topology, changes = problem.mesh, system.structure.mesh.topology, list[dict[str, Any]]()
+    n: Any = mesh.elements
+    if getattr(problem.structure, "mesh_file", None) is None:  # a structure of a user need not say it
+        n = n if isinstance(n, tuple) else (topology.index_map(topology.dim).size_global,)
+        numbers = [tuple(2 * k for k in n)] if finer else [tuple((k + 1) // 2 for k in n), tuple(2 * k for k in n)]
+        changes = [{"elements": k if len(k) > 1 else k[0]} for k in numbers]
+    return [mesh.model_copy(update=change) for change in (*changes, {"degree": mesh.degree + 1})]
 
 
-def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float, float]]:
-    """Yield meshes, the ratios of their cell sizes to those of a problem, and most cells with which these hold.
+def lines(system: Any) -> list[Array]:
+    """Return the coordinates (m) of all vertices of a mesh along each axis, each once and in order."""
+    mesh, out = system.structure.mesh, list[Array]()
+    for axis in range(mesh.topology.dim):
+        x = np.unique(np.concatenate(system.comm.allgather(np.unique(mesh.geometry.x[:, axis]))))
+        out.append(x[np.append(True, np.diff(x) > SAME * np.ptp(x))])
+    return out
 
-    Of an odd number of cells half are less than twice as long.
-    """
-    mesh = problem.mesh
-    if getattr(problem.structure, "mesh_file", None) is not None:  # a structure of a user need not say it
-        yield mesh.model_copy(update={"degree": mesh.degree + 1}), 0.5, inf
-        return
-    n = mesh.elements if isinstance(mesh.elements, tuple) else (cells,)
-    half, double = tuple((k + 1) // 2 for k in n), tuple(2 * k for k in n)
-    ratio, most = min(k / h for k, h in zip(n, half, strict=True)), cells * prod(half) / prod(n)
-    for elements, sizes, limit in ((half, ratio, most), (double, 0.5, inf)):
-        yield mesh.model_copy(update={"elements": elements if len(n) > 1 else elements[0]}), sizes, limit
+
+def lengths(there: Sequence[npt.ArrayLike], here: Sequence[npt.ArrayLike]) -> Array:
+    """Return the lengths of the intervals of some lines by those of others that their middle is in, of all axes."""
+    ratios = []
+    for a, b in zip(map(np.asarray, here), map(np.asarray, there), strict=True):
+        middle = (a[1:] + a[:-1]) / 2
+        ratios.append(np.diff(b)[np.searchsorted(b, middle) - 1] / np.diff(a))
+    return np.concatenate(ratios)
 
 
 # --- shapes carried from one mesh to another -------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import hypot
+from math import dist, hypot
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,9 @@ class Companion:
         state: reached; None before `begin`.
         difference: largest distance of the two outputs so far, and when, s.
         components: largest difference of every component of them.
-        doubled: time taken in doubled steps, s.
+        path: length of the way of its output so far, from one end of a step to the next.
+        doubled: part of that in doubled steps.
+        last: output at the end of the last step.
         sound: whether all its steps could be solved, and it is no farther away than the limit.
         limit: largest distance up to which it goes on.
         part: of the difference so far to which its steps are solved, where that is more than the tolerance.
@@ -173,7 +175,8 @@ class Companion:
         self.stepper.observers.append(self._arrived)
         self.further = list(further)
         self.state: State | None = None
-        self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
+        self.difference, self.path, self.doubled, self.sound = (0.0, 0.0), 0.0, 0.0, True
+        self.last: tuple[float, ...] = ()
         self.components: tuple[float, ...] = ()
         #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
         self.waiting: list[Followed | None] = [None, None]
@@ -190,7 +193,8 @@ class Companion:
         if v is not None:
             rates[: len(v)] += v
         self.state = self.stepper.start(0.0, start, rates)
-        self.components = (0.0,) * len(self.output(self.system, self.state))
+        self.last = tuple(map(float, self.output(self.system, self.state)))
+        self.components = (0.0,) * len(self.last)
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
@@ -226,8 +230,9 @@ class Companion:
         """Compare the outputs at the end of a step and within it, and pass it on."""
         step = self._step
         self.stepper.arrived(new)
-        self.doubled += leg.length if len(step.steps) > 1 else 0.0
-        self._compare(new, step.end)
+        before, self.last = self.last, self._compare(new, step.end)
+        self.path += (way := dist(before, self.last))
+        self.doubled += way if len(step.steps) > 1 else 0.0
         if self.interval is not None:
             row = round((old.t + new.t) / (2 * self.interval)) * self.interval
             if old.t < row < new.t:
@@ -258,9 +263,10 @@ class Companion:
         except ComputationError:
             self.sound = False
 
-    def _compare(self, here: State, there: State) -> None:
-        """Take note of the distance of the outputs at an instant."""
-        apart: Any = (self.output(self.system, here) - self.output(self.followed, there)).tolist()
+    def _compare(self, here: State, there: State) -> tuple[float, ...]:
+        """Take note of the distance of the outputs at an instant, and return its own one."""
+        own = self.output(self.system, here)
+        apart: Any = (own - self.output(self.followed, there)).tolist()
         size = hypot(*apart)
         self.sound &= size <= self.limit  # not where it is no number
         self.components = tuple(max(a, abs(b)) for a, b in zip(self.components, apart, strict=True))
@@ -268,6 +274,7 @@ class Companion:
             self.difference = size, there.t
             least = self.part * size / self.system.structure.length
             self.stepper.newton.tolerance = max(self.stepper.newton.tolerance, least)
+        return tuple(map(float, own))
 
 
 #: Order of a scheme up to which it is that of all motions. Stiff components reduce the order of others to that of their
@@ -347,8 +354,9 @@ class HistoryErrors:
         self.steps.finish()
         steps, mesh, scale = self.steps, self.mesh, scale if scale > 0.0 else np.inf
         out: dict[str, float | None] = {"time": None, "space": None}
-        if steps.sound and steps.state is not None and steps.doubled > steps.state.t / 2:  # less says too little
-            whole = steps.difference[0] * max(1.0, steps.state.t / steps.doubled)  # as if all of it had been doubled
+        if steps.sound and steps.doubled >= steps.path / 2:  # less says too little
+            # as if all of the way had been doubled
+            whole = steps.difference[0] * (steps.path / steps.doubled if steps.doubled > 0.0 else 1.0)
             out["time"] = error_of(whole / scale, self.scheme.order if self.scheme.order <= CERTAIN else 0)
         if steps.sound and mesh is not None and mesh.sound and self.other is not None:
             out["space"] = self.other.error(mesh.difference[0] / scale)

@@ -48,6 +48,10 @@ RATIO = math.sqrt(2.0)
 #: Highest degree of elements that a scene may ask for.
 HIGHEST = 6
 
+#: Most by which the numbers of steps and of cells grow from one answer to the next: what errors say of finer ones is an
+#: extrapolation, and one over more than three halvings is none.
+MOST_GROWTH = 8.0
+
 Elements = int | tuple[int, int] | None
 
 
@@ -133,10 +137,13 @@ class Setting:
         """Return the setting after one whose answer has missed an accuracy; None where nothing helps.
 
         Args:
-            error: `time`, `space` and `model` of the answer, as far as it has them; None where unknown.
+            error: `time`, `space` and `model` of the answer, as far as it has them, None where unknown; and `scale`, 0
+                where the output is round-off.
             accuracy: wanted.
         """
         allowed, new = (accuracy - contribution(error, "round_off")) / SAFETY, self
+        if error.get("scale") == 0.0:
+            return None
         if contribution(error, "model") > AIM * allowed:
             richer = self.richer()
             if richer is not None:
@@ -149,12 +156,15 @@ class Setting:
             return None
         known, of_steps = contribution(error, "time"), SAFETY * each
         if self.tolerance is not None and (error.get("time", 0.0) is None or known > of_steps):
-            new = replace(new, tolerance=self.tolerance * (AIM * of_steps / known if known > 0.0 else AIM**2))
+            less = AIM * of_steps / known if known > 0.0 else AIM**2
+            new = replace(new, tolerance=self.tolerance * max(less, MOST_GROWTH**-4))
         if (space := contribution(error, "space")) > each or error.get("space", 0.0) is None:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
             growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
             if self.elements is not None:
-                new = replace(new, elements=grown(self.elements, max(growth, 1.25)))  # less would hardly be another
+                new = replace(
+                    new, elements=grown(self.elements, min(max(growth, 1.25), MOST_GROWTH))
+                )  # less is no other
             elif self.degree < HIGHEST:
                 new = replace(new, degree=self.degree + 1)
             else:

@@ -251,6 +251,14 @@ def test_as_many_lines_as_meet_a_branch(unit_beam: Any) -> None:
     assert campbell(beam, "0:5:2", orders=0).summary["critical_speeds"] == []
 
 
+def test_critical_speeds_on_both_sides_of_zero(unit_beam: Any) -> None:
+    """The lines ω = k|Ω| have a kink at 0, which no speed is asked for at: what is critical at Ω is so at −Ω."""
+    beam = scene(unit_beam, "consistent_linear", 100, 0.3)
+    found = sorted(c["speed"] for c in campbell(beam, [-12.0, 12.0], orders=[1, 4]).summary["critical_speeds"])
+    assert len(found) >= 4
+    np.testing.assert_allclose(found, -np.array(found[::-1]), rtol=1e-6)
+
+
 def test_lines_and_speeds_of_operation_that_are_asked_for(unit_beam: Any, tmp_path: Path) -> None:
     """Of the lines 1 to 4 those asked for; options win over keys of the scene, and speeds are understood with units."""
     scene = unit_beam({"modes.orders": [4], "modes.operating": ["60 rpm", "90 rpm"]})

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rotfem
+from rotfem.commands.error_report import rounded_down
 from rotfem.refinement.estimate import ASYMPTOTIC, error_of
 
 BEAM = {
@@ -124,6 +125,47 @@ def test_what_cannot_be_doubled_is_unknown() -> None:
     assert run.summary["error"]["time"] is None
     assert run.summary["error"]["total"] is None
     assert any("error by the time steps could not be estimated" in line for line in run.warnings)
+
+
+def test_what_moves_in_single_steps_is_unknown() -> None:
+    """Half of the time is calm and taken in doubled steps, but all that moves is not: a record of each step."""
+    record = [[0.0, 0.0, 0.0]] + [[0.1 * i, 0.0, 20.0 * np.sin(i)] for i in range(22, 41)]
+    assert rotfem.run(scene(0.1, loads={"tip_force": record})).summary["error"]["time"] is None
+    assert rotfem.run(scene(0.1, loads={"tip_force": record}, time={"end": 10.0})).summary["error"]["time"] > 0.0
+
+
+def test_steps_of_different_length_are_not_doubled() -> None:
+    """A last step that is a hundredth of the one before: both together are hardly longer than that one."""
+    start = {"mode": 1, "amplitude": 0.01}
+    short, even = (
+        rotfem.run(scene(0.4, initial=start, time={"end": end})).summary["error"]["time"] for end in (0.404, 0.8)
+    )
+    assert short is None
+    assert even > ASYMPTOTIC
+
+
+def test_a_tip_that_only_turns_has_no_known_error() -> None:
+    """Torsion alone moves no tip: neither errors of 0 nor an accuracy that is met."""
+    stiff = {"EA": 2.8e7, "GA2": 1e7, "GA3": 1e7, "GJ": 8e3, "EI2": 1.4e4, "EI3": 1.4e4, "mass_per_length": 1.2}
+    tables = {
+        "structure": {"type": "spatial_beam", "length": 10.0, "section": stiff},
+        "motion": STILL,
+        "model": {"theory": "consistent_linear"},
+        "loads": {"tip_moment": [[0.0, 0.0, 0.0, 0.0], [0.01, 80.0, 0.0, 0.0], [0.02, 0.0, 0.0, 0.0]]},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.2, "step": 0.01},
+    }
+    run = rotfem.run(tables)
+    assert np.abs(run.tip["theta1"]).max() > 0.01
+    assert (run.summary["error"]["time"], run.summary["error"]["space"]) == (None, None)
+    assert any("the tip is not displaced" in line for line in run.warnings)
+    with pytest.raises(rotfem.ComputationError, match="the tip is not displaced"):
+        rotfem.run({**tables, "accuracy": 1e-3})
+
+
+@pytest.mark.parametrize(("x", "text"), [(0.0199, "0.01"), (0.02, "0.02"), (3e-4, "0.0003"), (9.99e-7, "9e-07")])
+def test_advice_is_rounded_down(x: float, text: str) -> None:
+    assert rounded_down(x) == text
 
 
 def test_unresolved_motion_is_said() -> None:

@@ -16,6 +16,8 @@ BEAM = {
     "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4},
 }
 MASSES = {**BEAM, "masses": [{"x": x, "mass": 0.1} for x in (2.0, 4.0, 6.0, 8.0)]}
+EI = [[0.0, 60.0], [0.5, 60.0], [0.51, 1.4e4], [10.0, 1.4e4]]
+SOFT = {**BEAM, "section": {**BEAM["section"], "EI": EI}}
 
 
 def result(structure: dict[str, Any], elements: Any, count: int) -> ModesResult:
@@ -46,6 +48,7 @@ def plate(length: float) -> dict[str, Any]:
         (plate(10.0), [8, 4], [40, 8], 5),
         (plate(2.0), [8, 1], [24, 12], 3),  # one cell across, which half the cells along would say nothing of
         (MASSES, 6, 40, 4),  # of which five are fixed by masses
+        (SOFT, 10, 100, 3),  # two short ones are fixed by the table, and matter most
     ],
 )
 def test_order_of_the_error(structure: dict[str, Any], coarse: Any, fine: Any, count: int) -> None:

@@ -13,6 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter, process_time
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,7 @@ from rotfem.commands.problem import Problem
 from rotfem.commands.run import Simulation
 from rotfem.commands.run_store import RunStore
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
+from rotfem.refinement.coarser import lines
 from rotfem.refinement.distance import COLUMNS
 from rotfem.refinement.refine import Clock, Setting, TooDear, cpu_time
 from rotfem.results.files import opened, writing
@@ -36,8 +38,8 @@ from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 
-#: Values of an output, and numbers of unknowns, steps and Newton iterations.
-Output = tuple[Array, tuple[int, int, int]]
+#: Values of an output, numbers of unknowns, steps and Newton iterations, and the lines of the mesh (see `lines`).
+Output = tuple[Array, tuple[int, int, int], list[list[float]]]
 
 
 @dataclass
@@ -52,6 +54,7 @@ class Measurement:
         setup, setup_cpu: of every repetition, s: mesh, forms (compiled before, on disk), constant operators.
         memory: bytes at the height, above what the program needs by itself; of all processes.
         dofs, steps, iterations: sizes and counts.
+        lines: coordinates of the vertices of the mesh along each axis, m.
     """
 
     status: str = "done"
@@ -65,6 +68,7 @@ class Measurement:
     dofs: int = 0
     steps: int = 0
     iterations: int = 0
+    lines: list[list[float]] = field(default_factory=list)
 
     def median(self, name: str) -> float:
         """Return the median of `wall`, `cpu`, `setup` or `setup_cpu`, s; nan where nothing was measured."""
@@ -147,7 +151,7 @@ class Bench:
         go = self._prepared(variant, clock, self.output)
         ready = perf_counter(), process_time()
         try:
-            values, counts = go()
+            values, counts, out.lines = go()
         finally:
             end = perf_counter(), process_time()
             peak = bytes_of("VmHWM") or 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -176,7 +180,8 @@ class Bench:
             result = simulation.run()
             columns = [x for name, x in result.history.items() if name.startswith(COLUMNS["tip"])]
             s = result.summary
-            return np.column_stack(columns), (s["dofs"], s["steps"], s["newton_iterations"])
+            counts = s["dofs"], s["steps"], s["newton_iterations"]
+            return np.column_stack(columns), counts, mesh_lines(simulation.system)
 
         return go
 
@@ -188,7 +193,8 @@ class Bench:
         def go() -> Output:
             values = analysis.at(speed, variant.modes.count).pairs.values[: variant.modes.count]
             dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
-            return np.column_stack([values.imag, values.real]), (dofs, 0, analysis.newton.iterations)
+            counts = dofs, 0, analysis.newton.iterations
+            return np.column_stack([values.imag, values.real]), counts, mesh_lines(analysis.system)
 
         return go
 
@@ -200,9 +206,15 @@ class Bench:
             result = diagram(variant, analysis, speeds, started)
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
             values = np.array([[frequency] for _, frequency in rows])
-            return values, (result.summary["dofs"], result.summary["speeds_solved"], 0)
+            counts = result.summary["dofs"], result.summary["speeds_solved"], 0
+            return values, counts, mesh_lines(analysis.system)
 
         return go
+
+
+def mesh_lines(system: Any) -> list[list[float]]:
+    """Return the coordinates (m) of the vertices of a system's mesh along each axis."""
+    return [list(map(float, x)) for x in lines(system)]
 
 
 # --- what is kept ----------------------------------------------------------------------------------------------------

@@ -44,6 +44,7 @@ from rotfem.equations.model import Model
 from rotfem.errors import ComputationError, InputError, SceneError
 from rotfem.listeners import Progress
 from rotfem.mechanics.theories import ladder, richest
+from rotfem.refinement.coarser import lengths
 from rotfem.refinement.distance import distance, distance_each
 from rotfem.refinement.refine import (
     AIM,
@@ -288,14 +289,13 @@ class Study:
         Unknown is that of steps which another tolerance does not change, and that of a mesh with cells that required
         nodes fix.
         """
-        coarser = {name: (other, self._computed(other)) for name, other in setting.coarser().items()}
+        coarser = {name: self._computed(other) for name, other in setting.coarser().items()}
         here, error = self._computed(setting), dict[str, float | None]()
         for name in ("time", "space") if setting.moving else ("space",):
-            error[name] = None
-            if name in coarser:
-                other, there = coarser[name]
-                fewer = there.dofs * setting.unknowns() <= here.dofs * other.unknowns()
-                ratio = here.steps / there.steps if name == "time" else RATIO if fewer else 1.0
+            there, error[name] = coarser.get(name), None
+            if there is not None:
+                sizes = RATIO if setting.elements is None else float(lengths(there.lines, here.lines).min())
+                ratio = here.steps / there.steps if name == "time" else sizes
                 if ratio > 1.0:
                     error[name] = self.apart(here.values, there.values) / min(1.0, ratio**2 - 1.0)
         known = [part for part in error.values() if part is not None]
