@@ -62,11 +62,8 @@ class ESDIRK4(Scheme):
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return stage i + 2 of the method, predicted by the acceleration of the stage before."""
         t = end if i == self.stages - 1 else state.t + C_ESDIRK[i + 1] * h
-        if done:
-            rates = done[0].carried  # v and a at the start and of all stages, which write theirs there
-        else:
-            rates = np.empty((self.stages + 1, 2, len(state.q)))
-            rates[0] = state.v, state.a
+        # v and a at the start and of all stages, which write theirs there
+        rates = done[0].carried if done else np.array([(state.v, state.a)] * (self.stages + 1))
         from_v, from_a = (h * A_ESDIRK[i + 1, : i + 1]).dot(rates[: i + 1].reshape(i + 1, -1)).reshape(2, -1)
         v, a = rates[i + 1]
         a[:] = rates[i, 1]

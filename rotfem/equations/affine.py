@@ -45,7 +45,7 @@ class AffineSystem(System):
             self._factors = self._factor_indices()
             self.leave_out(())
 
-    def _compile(self) -> Any:
+    def _compile(self) -> forms.Assembler:
         self._decomposed = Pieces(self.model, self.clamped, self.root, self.moving or self.parted)
         self.pieces = self._decomposed.all
         self._constants = self._decomposed.constants
@@ -59,7 +59,7 @@ class AffineSystem(System):
         self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
         self._make_operators()
         self._sums["K"] = self._decomposed.stiffness
-        return self._decomposed.assembler.pattern
+        return self._decomposed.assembler
 
     def _make_operators(self) -> None:
         """Make M, C, K and f of a time, none of which is set yet."""

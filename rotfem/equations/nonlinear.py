@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -115,11 +115,10 @@ class NonlinearSystem(System):
             is most of the work, and that of another theory, too.
 
     Attributes:
-        assembler: makes the matrices.
         signs: −1 of every local unknown, 0 where it is clamped.
     """
 
-    def _compile(self) -> Any:
+    def _compile(self) -> Assembler:
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._shift_entries = [constant.value for constant in self._shifts]  # where they are
@@ -138,14 +137,7 @@ class NonlinearSystem(System):
         else:
             self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
-        self.assembler = Assembler(self._pattern, self.bcs)
-        return self.assembler.zero()
-
-    def twin(self) -> Self:
-        """Return another system of the same forms (see `System.twin`)."""
-        other = super().twin()
-        other.A = self.assembler.zero()
-        return other
+        return Assembler(self._pattern, self.bcs)
 
     @cached_property
     def _residual_form(self) -> Any:

@@ -28,7 +28,7 @@ from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import added
+from rotfem.numerics.forms import Assembler, added
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.projection import PlusLowRank, summed
 from rotfem.structures.root_reaction import RootReaction
@@ -69,6 +69,7 @@ class System(Solutions, ABC):
         analysed: a solver with a symmetric matrix of the pattern, of which others can use the ordering; None at first.
         left_out: effects that are switched off.
         by_mode: the part of C that is damping by mode; None without, and where damping is left out.
+        assembler: makes matrices of the pattern of all tangents.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
 
@@ -105,7 +106,8 @@ class System(Solutions, ABC):
         self._solver: DirectSolver | None = None
         self._dx = Increment(self.V)
         self.by_mode: ByMode | None = None
-        self.A = self._compile()
+        self.assembler = self._compile()
+        self.A = self.assembler.pattern
         self._by_mode = self.by_mode = damping_by_mode(self)
         #: Whether a factor is kept for the steps that follow, where factorising is dear: soon of a plate's matrix.
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
@@ -119,7 +121,7 @@ class System(Solutions, ABC):
         vars(other).pop("balance", None)
         other._solver, other.factored, other._mass, other.analysed = None, None, None, None
         other.seconds = {"assemble": 0.0, "solve": 0.0}
-        other.A = self.A.duplicate()
+        other.A = self.assembler.zero()
         return other
 
     def count_rotations_from(self, reference: Any) -> None:
@@ -142,7 +144,8 @@ class System(Solutions, ABC):
         if reference is not None and self.compilations < self.model.compositions:
             forget(self)
             self.model.shown, self._solver = None, None
-            self.A = self._compile()
+            self.assembler = self._compile()
+            self.A = self.assembler.pattern
             self.compilations = self.model.compositions
 
     @property
@@ -177,8 +180,8 @@ class System(Solutions, ABC):
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
 
     @abstractmethod
-    def _compile(self) -> Any:
-        """Compile the forms; return a matrix of the pattern of all tangents."""
+    def _compile(self) -> Assembler:
+        """Compile the forms; return what makes matrices of the pattern of all tangents."""
 
     @abstractmethod
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
