@@ -19,8 +19,8 @@ def locate(domain: Any, point: Sequence[float]) -> tuple[npt.NDArray[np.int32], 
     """
     comm, tdim = domain.comm, domain.topology.dim
     owned = domain.topology.index_map(tdim).size_local
-    x = np.array([(*point, 0.0, 0.0)[:3]])
-    spread = 1e-9 * float(np.max(np.ptp(domain.geometry.x, axis=0), initial=0.0))
+    x, nodes = np.array([(*point, 0.0, 0.0)[:3]]), domain.geometry.x
+    spread = 1e-9 * float(np.ptp(nodes, axis=0).max()) if len(nodes) else 0.0
     tree = geometry.bb_tree(domain, tdim, padding=spread)
     candidates = geometry.compute_collisions_points(tree, x)
     hits = geometry.compute_colliding_cells(domain, candidates, x).links(0)
