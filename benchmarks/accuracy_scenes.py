@@ -1,13 +1,13 @@
 """Scenes of different character, and what their runs say of their error against the error they have.
 
-    ./with-fenicsx python benchmarks/accuracy_scenes.py [--cache FOLDER] [--set known|held_out|…|last] [NAME …]
+    ./with-fenicsx python benchmarks/accuracy_scenes.py [--cache FOLDER] [--set known|held_out|…|fresh] [NAME …]
 
 prints, for every scene, estimated and true error of steps, mesh and in all, and the median and the worst of their
 ratios. The truth is computed once and kept in the folder: of the steps from eight times as many, of the mesh from
 twice the elements (of a mesh file from one degree more) in these steps, in all from both together with the exact
-theory. `SCENES` is for others too: name ↦ tables. The scenes of held_out_scenes.py and later_scenes.py are of other
-kinds. The price of an estimate is the CPU time it adds, over that of the run without: the median of so many pairs, turn
-by turn.
+theory. `SCENES` is for others too: name ↦ tables. The scenes of held_out_scenes.py, later_scenes.py and fresh_scenes.py
+are of other kinds. The price of an estimate is the CPU time it adds, over that of the run without: the median of so
+many pairs, turn by turn.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from fresh_scenes import SCENES as FRESH
 from held_out_scenes import SCENES as HELD_OUT
 from later_scenes import FURTHER, LAST, UNSEEN
 from scipy.interpolate import CubicSpline
@@ -213,8 +214,11 @@ def finer(tables: Tables, steps: int = 1, mesh: int = 1, theory: str | None = No
     return out
 
 
-#: Sets of scenes by their names, and pairs of runs with and without an estimate.
-SETS, PAIRS = {"known": SCENES, "held_out": HELD_OUT, "unseen": UNSEEN, "further": FURTHER, "last": LAST}, 3
+#: Sets of scenes by their names.
+SETS = {"known": SCENES, "held_out": HELD_OUT, "unseen": UNSEEN, "further": FURTHER, "last": LAST, "fresh": FRESH}
+
+#: Pairs of runs with and without an estimate.
+PAIRS = 3
 
 
 class Truth:

@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 import rotfem
 from rotfem.commands.cost.bench import Bench
-from rotfem.commands.cost.result import CostResult, setting_of
+from rotfem.commands.cost.result import CostResult
 from rotfem.refinement.distance import distance, distance_each
 from rotfem.refinement.refine import HIGHEST, Clock, Setting, grown
 from rotfem.scene import Scene, load_scene
@@ -183,7 +183,7 @@ def again(scene: Scene, result: CostResult, row: dict[str, Any]) -> tuple[float,
     """Return error and CPU time (s) of the recommended setting, computed anew."""
     clock = Clock(None, MPI.COMM_WORLD)
     bench = Bench(scene.replace({"output.error": False}), result.summary["output"], MPI.COMM_WORLD)
-    anew, truth = (bench.measure(s, n, None, clock) for s, n in ((setting_of(row), 2), (outsider(result), 1)))
+    anew, truth = (bench.measure(s, n, None, clock) for s, n in ((Setting.of(row), 2), (outsider(result), 1)))
     if anew.values is None or truth.values is None:
         raise SystemExit(f"{scene.name}: {anew.reason}{truth.reason}")
     apart = distance if result.summary["output"] == "tip" else distance_each
@@ -216,7 +216,7 @@ def main() -> None:
         kept = error <= 1.5 * max(promised, known) and error <= accuracy and 0.5 <= cost / row["cost"] <= 2.0
         print(
             f"{name:<18} {accuracy:>6.0e}  {promised:.1e} ± {known:.0e} {error:>8.1e} {row['cost']:>9.3f} {cost:>7.3f} "
-            f"| {spent:>6.1f} {s['settings']:>4} {'kept' if kept else 'NOT KEPT'}: {setting_of(row).words()}",
+            f"| {spent:>6.1f} {s['settings']:>4} {'kept' if kept else 'NOT KEPT'}: {Setting.of(row).words()}",
             flush=True,
         )
 
