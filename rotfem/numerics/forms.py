@@ -56,7 +56,8 @@ class Assembler:
         columns = own.index_map(1).local_to_global(own.indices[: rows[-1]]).astype(PETSc.IntType)
         held = [dof for bc in bcs for dof in bc.dof_indices()[0] if dof < owned]
         at = [rows[dof] + np.searchsorted(own.indices[rows[dof] : rows[dof + 1]], dof) for dof in held]
-        self._diagonal, self._entries = np.array(at, dtype=np.intp), np.asarray(own.data)
+        self._diagonal, self._all = np.array(at, dtype=np.intp), np.asarray(own.data)
+        self._entries = self._all[: rows[-1]]  # the owned ones
         #: By kind of matrix, that of all others "K": the places of its entries in the whole pattern, rows and columns.
         self._patterns: dict[str, tuple[Any, Any, Any]] = {"K": (None, rows, columns)}
         self.pattern, self.coupled = self.zero(), np.ones((self._block, self._block), dtype=bool)
@@ -64,7 +65,7 @@ class Assembler:
     def release(self) -> None:
         """Give back the memory of a matrix; no form is assembled any more."""
         self._patterns = {kind: (None, *csr) for kind, (_, *csr) in self._patterns.items()}
-        del self._own, self._entries
+        del self._own, self._all, self._entries
 
     def zero(self, kind: str = "K") -> Any:
         """Return a new matrix of zeros, which on one process takes up memory when it is filled."""
@@ -118,7 +119,7 @@ class Assembler:
     def _assembled(self, *several: Any, diagonal: float | None = None) -> Any:
         """Return the owned entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
         A, held = self._own._cpp_object, [] if diagonal is None else self._held
-        self._entries.fill(0.0)
+        self._all.fill(0.0)
         for form in several:
             code = form._cpp_object
             cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), held)
@@ -126,7 +127,7 @@ class Assembler:
             self._own.scatter_reverse()
         if diagonal is not None:
             self._entries[self._diagonal] = diagonal
-        return self._entries[: self._own.indptr[self._sizes[0][0]]]
+        return self._entries
 
     def _pattern(self, kind: str) -> tuple[Any, Any, Any]:
         return self._patterns.get(kind, self._patterns["K"])
