@@ -275,9 +275,9 @@ class AdaptiveSteps:
         return Leg(stop, h, lands, (float(self.lines[i, 0]), float(self.lines[i, 1])) if there else None)
 
 
-#: Filters are made for steps in this ratio. They take owned arrays.
+#: Filters, of owned arrays, are made for steps in this ratio; the last ones are kept, as a complex factor is large.
 COARSE = 1.5
-Filter = Callable[[Any], Any]
+Filter = Callable[[Array], Array]
 
 
 class ErrorMeasure:
@@ -313,7 +313,8 @@ class ErrorMeasure:
         self.inner.set_state(self.inner.zeros())
         self._matrices = system.with_hub(self.inner.mass_damping_stiffness())
         self._owned = self.inner.V.dofmap.index_map.size_local * self.inner.V.dofmap.index_map_bs
-        self._kept: dict[int, list[list[Filter]]] = {}
+        self._length: int | None = None
+        self._filters: list[list[Filter]] = []
 
     def __call__(self, error: Array, h: float) -> float:
         """Return the largest entry of the error, in units of the unknowns' scale.
@@ -322,15 +323,13 @@ class ErrorMeasure:
             error: local error of q, local dof array; of a free hub with that of its angle last.
             h: length of the step, s.
         """
-        length = round(np.log(h) / np.log(COARSE))
-        if length not in self._kept:
-            while len(self._kept) >= 4:
-                self._kept.pop(next(iter(self._kept)))
-            self._kept[length] = self._made(COARSE**length)
         e = np.full(self._matrices[0].getLocalSize()[0], error[-1])  # the last process has the angle of a hub
         e[: self._owned] = error[: self._owned]
-        filtered = (reduce(lambda e, through: through(e), filters, e) for filters in self._kept[length])
-        adds_up, remains = (self.size(with_ghosts(self.inner.V, x.real[: self._owned])) for x in filtered)
+        length = round(np.log(h) / np.log(COARSE))
+        if length != self._length:
+            self._length, self._filters = length, self._made(COARSE**length)
+        filtered = (reduce(lambda e, through: through(e), filters, e)[: self._owned] for filters in self._filters)
+        adds_up, remains = (self.size(with_ghosts(self.inner.V, x)) for x in filtered)
         return 2.0 * max(self.end / h * adds_up, remains)
 
     def size(self, x: Array) -> float:
@@ -349,20 +348,23 @@ class ErrorMeasure:
         """Return the filters of B, and that of what is not resolved, for steps of h (s)."""
         constant, order, lost = self.scheme.estimate
         n, tau = (order + 1) // 2, h * (0.5 * constant * self.end / h) ** (1 / order)
-        B = [self._filter(1.0, tau)] if n % 2 else []
-        for k in range(n - 1, 0, -2):
-            B += 2 * [self._filter(np.exp(0.5j * np.pi * k / n), tau)]
+        B = [self._filter(np.exp(0.5j * np.pi * k / n), tau) for k in range(n - 1, -1, -2)]
         return [B, [self._filter(1.0, lost * h)]]
 
     def _filter(self, z: complex, tau: float) -> Filter:
-        """Return a filter; that of a complex z gives the conjugate, so that z̄ is filtered with if it is used again."""
+        """Return the filter of z, of a complex one with that of its conjugate."""
         (M, C, K), weights = self._matrices, np.array([z, tau, tau**2 / z])
         if np.isreal(z):
             real = DirectSolver(combine(sparse_part(M).duplicate(), [M, C, K], weights.real))
-            return lambda e: real.solve_all(times(M, e.real[:, None]))[:, 0]
+            return lambda e: real.solve_all(times(M, e[:, None]))[:, 0]
         solver = ComplexSolver((M, C, K))
         solver.factor(list(weights))
-        return lambda e: np.conj(z * solver.solve(times(M, np.stack([e.real, e.imag], axis=1)) @ (1.0, 1.0j)))
+
+        def both(e: Array) -> Array:
+            x = z * solver.solve(times(M, e[:, None])[:, 0].astype(np.complex128))
+            return np.real(z * solver.solve(times(M, np.stack([x.real, -x.imag], axis=1)) @ (1.0, 1.0j)))
+
+        return both
 
 
 #: Switches back in the very next step, and steps tried meanwhile, that are a sliding mode. A switch that the motion
