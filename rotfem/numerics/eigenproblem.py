@@ -187,6 +187,11 @@ class Eigenpairs:
     errors: Array
     bounds: Array
 
+    @property
+    def resolved(self) -> Array:
+        """λ, shape (m,); zero where it is so to round-off."""
+        return np.where(self.bounds < 1.0, self.values, 0.0)
+
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
         vectors = self.right[:, index], self.left[:, index]

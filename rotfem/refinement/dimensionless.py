@@ -40,9 +40,9 @@ def groups(of: Explanation) -> dict[str, float]:
     # Neither a mesh file's plate nor any other structure need have a length of its own.
     length = float(getattr(structure, "length", None) or system.structure.length)
     at_rest = _frequencies_at_rest(of)
-    first = float(at_rest[0]) if at_rest.size else None
+    first = float(at_rest[0]) if at_rest.size else 0.0
     speeds, rates = _turning(case, system)
-    out = {} if first is None else {"speed_ratio": float(np.abs(speeds).max()) / first}
+    out = {"speed_ratio": float(np.abs(speeds).max()) / first} if first > 0.0 else {}
     radius = _radius(structure)
     if radius is not None and radius > 0.0:
         out["slenderness"] = length / radius
@@ -50,13 +50,13 @@ def groups(of: Explanation) -> dict[str, float]:
         out |= {"deflection": of.scale / length, "rotation": of.size}
     root = getattr(structure, "root_position", structure.hub_radius)
     out["hub_ratio"] = float(np.linalg.norm(root)) / length
-    if first is not None:
+    if first > 0.0:
         out["spin_rate_change"] = float(np.abs(rates).max()) / first**2
-    if len(values) and not structure.damping.is_zero:
+    if np.any(values[:1]) and not structure.damping.is_zero:
         out["damping"] = float(-values[0].real / abs(values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
-    if case.steps is not None and case.steps.step is not None and (first is not None or len(values)):
+    if case.steps is not None and case.steps.step is not None and (at_rest.size or len(values)):
         fastest = float(np.abs(values).max()) if len(values) else float(at_rest[-1])
         out["steps_per_period"] = 2 * np.pi / fastest / case.steps.step
     return out
@@ -68,7 +68,7 @@ def _frequencies_at_rest(of: Explanation) -> Array:
     held.set_time(0.0, of.problem.motion.at_speed(0.0))
     held.set_state(held.zeros())
     try:
-        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.case.mode_count)).values))
+        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.case.mode_count)).resolved))
     except ComputationError:
         return np.empty(0)
 

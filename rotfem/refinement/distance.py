@@ -47,10 +47,12 @@ def distance(one: Array, other: Array) -> float:
 def distance_each(one: Array, other: Array) -> float:
     """Return the largest distance of two lists of eigenvalues, complex or (n, components), each relative to itself.
 
-    Of lists of different length the first ones are compared.
+    One that is zero is compared with the least that is not. Of lists of different length the first ones are compared.
     """
-    pairs = zip(one, other, strict=False)
-    return max((distance(np.reshape(a, (1, -1)), np.reshape(b, (1, -1))) for a, b in pairs), default=0.0)
+    sizes = [float(np.linalg.norm(a)) for a in one]
+    least = min(filter(None, sizes), default=1e-300)
+    pairs = zip(one, other, sizes, strict=False)
+    return max((float(np.linalg.norm(b - a)) / (size or least) for a, b, size in pairs), default=0.0)
 
 
 def largest(values: Array) -> float:

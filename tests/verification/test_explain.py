@@ -195,6 +195,20 @@ def test_centrifugal_row_of_a_hinged_rigid_blade() -> None:
     assert rows["linear"]["verdict"] == "large"  # −Ω² softens it, and no stress stiffens it
 
 
+def test_rows_of_a_blade_whose_hinge_nothing_holds() -> None:
+    """Its zero eigenvalue is round-off, which is not compared with itself, and no group is relative to it.
+
+    Without stress stiffness it is ±Ω.
+    """
+    structure = {**STRUCTURE, "hub_radius": 0.0, "root": {"lag_stiffness": 0.0}}
+    tables = {"structure": structure, "mesh": {"elements": 4}, "modes": {"count": 3}}
+    for speed, changed in ((0.0, set[str]()), (2.0, {"centrifugal", "linear"})):
+        found = rotfem.explain(tables | {"motion": {"type": "constant", "speed": speed}})
+        rows = {row["name"]: row["estimate"][MODES] for row in found.rows}
+        assert {name for name, change in rows.items() if change > 0.03} == changed
+        assert not {"speed_ratio", "spin_rate_change"} & set(found.summary["groups"])
+
+
 @pytest.mark.parametrize(
     "tables",
     [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.nightly)],
