@@ -5,6 +5,7 @@ A kill in the middle, two programs at once, or a damaged cache do no harm.
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -27,6 +28,8 @@ from ufl.corealg.multifunction import MultiFunction
 from rotfem.numerics import form_cache, traversal
 
 traversal.install()
+#: UFL's module, which its function of the same name hides.
+form_data: Any = importlib.import_module("ufl.algorithms.compute_form_data")
 
 SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
@@ -348,12 +351,23 @@ def quadrature_points(domain: Any, number: int) -> Any:
 
 def integral_count(f: Any) -> int:
     """Return the number of integrals of a UFL form after differentiation, which is done once for any form."""
+    return _noted_count(f, lambda: expand_derivatives(f))
 
-    def count() -> int:
-        expanded = expand_derivatives(f)
-        return 0 if expanded.empty() else len(expanded.integrals())
 
-    return form_cache.noted(f.signature(), count)
+def _noted_count(f: Any, expanded: Callable[[], Any]) -> int:
+    """Return the number of integrals that a form has when it is expanded."""
+    return form_cache.noted(f.signature(), lambda: 0 if (e := expanded()).empty() else len(e.integrals()))
+
+
+def _preprocess_form(f: Any, complex_mode: bool) -> Any:
+    """Return a form as UFL's function of this name, differentiated, on the way to its code; count its integrals."""
+    out = _preprocessed(f, complex_mode)
+    _noted_count(f, lambda: out)
+    return out
+
+
+_preprocessed = form_data.preprocess_form
+form_data.preprocess_form = _preprocess_form
 
 
 def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str]) -> tuple[list[Any], Any]:

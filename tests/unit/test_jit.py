@@ -100,7 +100,7 @@ def test_errors_of_the_compiler_are_errors(cache: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(forms, "FLAGS", ("-no-such-flag",))
     with pytest.raises(Exception, match=r"[Cc]ompileError|failed"):
         forms.form(mass())
-    assert sorted(path.name for path in cache.iterdir()) == ["lock"]
+    assert sorted(path.name for path in cache.iterdir()) == ["counts", "lock"]
 
 
 def test_plug_ins_are_looked_for_once(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
