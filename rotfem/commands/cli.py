@@ -120,7 +120,7 @@ def campbell(
 def response(
     todo: Job,
     low: Annotated[
-        str | None, typer.Option("--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0]")
+        str | None, typer.Option("--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0; free hub: half the first]")
     ] = None,
     high: Annotated[
         str | None, typer.Option("--to", metavar="FREQUENCY", help="highest [beyond the highest of modes.count]")

@@ -59,7 +59,8 @@ def response(
 
     Args:
         scene: scene, path of a scene file, or nested tables; `modes.count` is that of the response by modes.
-        low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; 0 if None.
+        low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; if None 0, or of a free hub, which nothing
+            holds, half the first frequency of a mode.
         high: highest frequency; beyond the highest of the modes if None.
         number: frequencies between them, at equal distances; those by which peaks are seen and curves run
             smoothly come on top, of the latter no more than these.
@@ -132,9 +133,10 @@ def frequencies_of(
         raise SceneError("command line", "--per-rev", list(per_rev), "orders must be above 0, of a hub that spins")
     if len(lines) and low is None and high is None:
         return np.unique(lines), np.zeros(len(np.unique(lines)), dtype=bool), []
-    last = angular(high, "--to", 1.2 * float(np.max(spinning.pairs.values.imag)))  # a fifth beyond the highest mode
+    swinging = spinning.pairs.resolved.imag
+    last = angular(high, "--to", 1.2 * float(np.max(swinging)))  # a fifth beyond the highest mode
     free = answers.analysis.free
-    first = angular(low, "--from", last / max(number, 1) if free else 0.0)
+    first = angular(low, "--from", 0.5 * float(np.min(swinging[swinging > 0.0], initial=last)) if free else 0.0)
     if free and first == 0.0:
         raise SceneError("command line", "--from", low, "must be above 0 of a free hub, which nothing holds")
     if not 0.0 <= first < last or number < 2:

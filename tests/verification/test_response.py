@@ -157,6 +157,15 @@ def test_a_free_hub_is_not_held():
         response(scene(motion=hub), 0.0, 10.0, number=3)
 
 
+def test_a_free_hub_starts_below_its_modes():
+    """The first of four undamped modes is below one of so few intervals."""
+    hub = {"type": "torque", "hub_inertia": 50.0, "speed": 2.0}
+    found = response(scene(structure=STRUCTURE, motion=hub), number=5)
+    first = min(mode["frequency"] for mode in found.summary["modes"] if mode["frequency"] > 0.0)
+    assert found.frequencies[0] == pytest.approx(first / 2)
+    assert any(f" {first:.6g} rad/s" in line for line in found.warnings)
+
+
 def test_without_damping_it_is_said():
     tables = scene(structure=STRUCTURE)
     warned = response(tables, 1.0, 10.0, number=3)
