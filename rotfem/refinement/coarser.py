@@ -92,7 +92,8 @@ def _meshes(problem: Problem, system: Any, finer: bool) -> list[Any]:
         n = n if isinstance(n, tuple) else (topology.index_map(topology.dim).size_global,)
         numbers = [tuple(2 * k for k in n)] if finer else [tuple((k + 1) // 2 for k in n), tuple(2 * k for k in n)]
         changes = [{"elements": k if len(k) > 1 else k[0]} for k in numbers]
-    return [mesh.model_copy(update=change) for change in (*changes, {"degree": mesh.degree + 1})]
+    higher = {"degree": system.V.element.basix_element.degree + 1}  # a default differs by cell
+    return [mesh.model_copy(update=change) for change in (*changes, higher)]
 
 
 def lines(system: Any) -> list[Array]:

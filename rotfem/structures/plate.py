@@ -31,6 +31,7 @@ from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
+from rotfem.structures.section_fields import field_values
 from rotfem.structures.structure import Array, Structure, TipValues, check_memory
 
 
@@ -78,17 +79,29 @@ def constants(data: Any) -> dict[str, float]:
     return {name: values["G12"] if value is None else value for name, value in values.items()}
 
 
-def thickness_field(data: Any, grid: PlateGrid) -> fem.Function:
-    """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines."""
+def thickness_field(data: Any, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
+    """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines.
+
+    Args:
+        data: of the structure.
+        grid: its mesh.
+        rows: places of rows of tables that may be inside cells (m).
+        degree: of the field, if there are any (see `rotfem.structures.section_fields`).
+    """
     if isinstance(data.thickness, dict):
         h = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name="thickness")
         for name, value in data.thickness.items():
             h.x.array[grid.regions.find(grid.region_names[name])] = value
         h.x.scatter_forward()
         return h
-    h = fem.Function(fem.functionspace(grid.mesh, ("DG", 1)), name="thickness")
-    h.interpolate(lambda x: data.thickness_at(x[0]))
+    h = fem.Function(fem.functionspace(grid.mesh, ("DG", degree if len(rows) else 1)), name="thickness")
+    h.x.array[:] = field_values(lambda x, _: data.thickness_at(x), rows, degree, h.function_space, positive).ravel()
     return h
+
+
+def positive(values: Array) -> bool:
+    """Return whether all values are positive."""
+    return bool(np.all(values > 0.0))
 
 
 def plane_stress(p: Mapping[str, Any]) -> Any:
@@ -153,6 +166,9 @@ class Plate(Structure):
         if (why := settings.locking_on(cell)) is not None:
             raise InputError("mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
+        if s.mesh is not None:  # whose lines are where they are
+            thick = [x for x, _ in s.thickness] if isinstance(s.thickness, tuple) else []
+            self.inner_rows = np.unique([*thick, *problem.loads.stations])
         self.check_shared()
         self.points = plate_points(self)
         subdomains = self.points.subdomains
@@ -215,7 +231,8 @@ class Plate(Structure):
     def _properties(self) -> None:
         """Make the constants and fields of thickness and material, and of the hub."""
         s = self.data
-        h = self.constant(s.thickness) if isinstance(s.thickness, float) else thickness_field(s, self.grid)
+        degree, uniform = self.V.element.basix_element.degree, isinstance(s.thickness, float)
+        h = self.constant(s.thickness) if uniform else thickness_field(s, self.grid, self.inner_rows, degree)
         self.section["thickness"] = h
         self.section |= {name: self.constant(value) for name, value in constants(s).items()}
         names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")

@@ -7,6 +7,7 @@ and that frequencies go to those of the mesh that follows all rows.
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from rotfem.scene import Scene
 from rotfem.structures import build
 from rotfem.structures.section_fields import not_negative, positive_matrices
 from tests.beams import STRUCTURE
+from tests.plate_mesh_files import grid, write_msh
 
 LENGTH, ROWS = 10.0, 41
 X = np.linspace(0.0, LENGTH, ROWS) + np.sin(np.arange(ROWS) * np.pi / (ROWS - 1)) * np.sin(7.0 * np.arange(ROWS)) * 0.05
@@ -145,3 +147,43 @@ def test_masses_are_nodes_and_a_hint_says_so_where_they_ask_for_more_elements() 
     assert advise(case, list[str]().append)[0].startswith("point masses and kinks at 3 places")
     ends = np.unique(beam(case).mesh.geometry.x[:, 0])
     np.testing.assert_allclose(ends, [0.0, 2.0, 4.0, 6.0, LENGTH], atol=1e-12)
+
+
+# --- cells of a mesh file -------------------------------------------------------------------------------------------
+
+PLATE = {"type": "plate", "E": 70e9, "nu": 0.3, "rho": 2700.0}
+
+
+def plate(path: Path, cells: int, corners: int = 4, thickness: Any = 0.01, **loads: Any) -> dict[str, Any]:
+    """Return a plate of 1 × 0.2 m on a mesh file of two cells across, or of halves of these, at rest."""
+    points, groups = grid(cells, 2, 1.0, 0.2)
+    if corners == 3:
+        groups["plate"] = [half for a, b, c, d in groups["plate"] for half in ([a, b, c], [a, c, d])]
+    structure = PLATE | {"mesh": str(write_msh(path / "plate.msh", points, groups)), "thickness": thickness}
+    motion = {"type": "constant", "speed": 0.0}
+    return {"structure": structure, "motion": motion, "model": {"theory": "linear"}, "loads": loads}
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_a_load_between_the_corners_of_a_mesh_file_has_its_force_and_moment(corners: int, tmp_path: Path) -> None:
+    """0.08 N around x = 0.54 within one of four cells; a beam has 8e-6 m, and the error is not said to be nothing."""
+    found = rotfem.run(plate(tmp_path, 4, corners, pressure={"over_span": [[0.52, 10.0], [0.56, 10.0]]}))
+    assert found.history["root_f3"][-1] == pytest.approx(-0.08, rel=1e-6)
+    assert found.history["root_m2"][-1] == pytest.approx(0.08 * 0.54, rel=1e-6)
+    assert found.tip["u3"][-1] == pytest.approx(7.985e-6, rel=0.01)  # that of 40 × 4 cells with rows for mesh lines
+    assert found.summary["error"]["space"] > 1e-4
+
+
+def test_a_step_of_thickness_within_cells_of_a_mesh_file_is_in_mass_and_error(tmp_path: Path) -> None:
+    """Mass and first moment are those of the table. The tip of 40 × 4 cells with a line there moves by 5.7368e-5 m."""
+    rows = [[0.0, 0.02], [0.55, 0.02], [0.5501, 0.01], [1.0, 0.01]]
+    case = plate(tmp_path, 8, thickness=rows, tip_force=[0.0, 0.0, 1.0])
+    body, x = rotfem.check(case), np.array([r[0] for r in rows])
+    h, dx = np.array([r[1] for r in rows]), np.diff(x)
+    first = np.sum(dx * (h[:-1] * (2 * x[:-1] + x[1:]) + h[1:] * (x[:-1] + 2 * x[1:])) / 6)
+    assert body.mass == pytest.approx(2700 * 0.2 * np.trapezoid(h, x), rel=1e-10)
+    assert body.summary["first_moment_root"][0] == pytest.approx(2700 * 0.2 * first, rel=1e-10)
+    found = rotfem.run(case)
+    off = abs(found.tip["u3"][-1] / 5.7368e-5 - 1.0)
+    assert off < 0.04
+    assert found.summary["error"]["space"] > off / 2
