@@ -50,7 +50,7 @@ def check_memory(
     if unknowns < 1e5:  # nothing is asked of the system for what fits anywhere
         return
     # Bytes per unknown, component and dimension of the mesh, of what takes least, so that nothing is refused that fits:
-    # modes of plates of 10⁵ to 10⁶ unknowns took 6.2 to 7.5 kB per unknown, on two processes together 18 to 20 kB;
+    # modes of plates of 10⁵ to 10⁶ unknowns took 6.4 to 7.5 kB per unknown, on two processes together 18 to 20 kB;
     # planar beams of 4·10⁴ elements 3 kB (degrees 1 and 3). Errors of histories take more (docs/scaling.md).
     needed = times * 600 * (2.8 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
