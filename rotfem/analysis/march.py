@@ -159,8 +159,8 @@ MOST_STEPS, PACE = 500_000, 5000
 
 #: What to do then.
 QUICKER = (
-    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what is "
-    "quicker than they are; a looser time.tolerance; or an earlier time.end"
+    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what "
+    "is quicker than they are; a looser time.tolerance; or an earlier time.end"
 )
 
 
