@@ -120,7 +120,10 @@ def campbell(
 def response(
     todo: Job,
     low: Annotated[
-        str | None, typer.Option("--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0; free hub: half the first]")
+        str | None,
+        typer.Option(
+            "--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0, or half a free hub's first]"
+        ),
     ] = None,
     high: Annotated[
         str | None, typer.Option("--to", metavar="FREQUENCY", help="highest [beyond the highest of modes.count]")

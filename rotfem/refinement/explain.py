@@ -322,7 +322,6 @@ class Explanation:
         except ComputationError as error:
             self._fails(HISTORY, error.what)
             return on_other_mesh(self.problem, self.system)
-        self.scale = largest(own.tips)
         known = errors.errors(self.scale)
         self.mesh.estimate[HISTORY], self.steps.estimate[HISTORY] = known["space"], known["time"]
         system, mesh, other = self.system, errors.mesh, errors.other
@@ -379,11 +378,12 @@ class Explanation:
         march.stepper.observers = list(watches)
         for state in march:
             size = float(system.size(state.q))
-            self.size = max(self.size, size) if system is self.system else self.size
+            tips.append(tip(system, state))
+            if system is self.system:  # what a march that fails has reached, too
+                self.size, self.scale = max(self.size, size), max(self.scale, float(np.linalg.norm(tips[-1])))
             if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
                 raise ComputationError(f"it diverges at t = {state.t:.4g} s")
             times.append(state.t)
-            tips.append(tip(system, state))
         for companion in watches:
             companion.finish()
         return History(np.array(times), np.array(tips))
