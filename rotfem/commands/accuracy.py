@@ -45,12 +45,18 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
             elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
         else:
             elements = -(-nodes // mesh.degree)
-    first = Setting(models_of(scene, moving=time is not None), elements, mesh.degree)
+    first = Setting(models_of(scene, moving=time is not None), elements, degree_of(scene))
     if time is None:
         return first
     assert scene.accuracy is not None
     least = 0.0 if scene.accuracy_budget is None else COARSE
     return replace(first, scheme="esdirk4", tolerance=max(scene.accuracy / SAFETY, least))
+
+
+def degree_of(scene: Scene) -> int:
+    """Return the degree of a scene's elements; 3 if it names none for a mesh file: none of its cells locks then."""
+    given = scene.structure.mesh_file is None or "degree" in scene.mesh.model_fields_set
+    return scene.mesh.degree if given else 3
 
 
 def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
@@ -189,7 +195,7 @@ def within_tolerance(
     tolerance, own, linear = scene.model.tolerance, scene.model.theory, linear_of(scene)
     assert tolerance is not None
     names = [own] if linear is None or linear.name == own else [linear.name, own]
-    first = resumed or Setting(tuple({"theory": name} for name in names), None, scene.mesh.degree)
+    first = resumed or Setting(tuple({"theory": name} for name in names), None, degree_of(scene))
     found, started = Refinement[R](), perf_counter()
 
     def answer(setting: Setting) -> tuple[R, dict[str, Any]]:

@@ -174,6 +174,14 @@ def test_a_load_between_the_corners_of_a_mesh_file_has_its_force_and_moment(corn
     assert found.summary["error"]["space"] > 1e-4
 
 
+def test_triangles_of_a_mesh_file_are_refined_to_an_accuracy(tmp_path: Path) -> None:
+    """Without a degree they begin with the one that does not lock, and go on to higher ones."""
+    load = {"over_span": [[0.52, 10.0], [0.56, 10.0]]}
+    found = rotfem.run(plate(tmp_path, 4, 3, pressure=load) | {"accuracy": 2e-3})
+    assert found.summary["accuracy"]["met"]
+    assert found.tip["u3"][-1] == pytest.approx(7.985e-6, rel=4e-3)
+
+
 def test_a_step_of_thickness_within_cells_of_a_mesh_file_is_in_mass_and_error(tmp_path: Path) -> None:
     """Mass and first moment are those of the table. The tip of 40 × 4 cells with a line there moves by 5.7368e-5 m."""
     rows = [[0.0, 0.02], [0.55, 0.02], [0.5501, 0.01], [1.0, 0.01]]

@@ -8,6 +8,7 @@ from math import inf
 from typing import Any
 
 from rotfem import registry
+from rotfem.commands.accuracy import degree_of
 from rotfem.commands.problem import motion_of
 from rotfem.errors import SceneError
 from rotfem.mechanics.theories import theories
@@ -41,10 +42,8 @@ def parts_of(setting: Setting) -> tuple[tuple[Any, ...], ...]:
 def own_setting(scene: Scene, output: str = "tip") -> Setting:
     """Return the setting of the scene itself; steps are part of it where the output is a history."""
     mesh, time = scene.mesh, scene.time if output == "tip" else None
-    elements, degree = getattr(mesh, "elements", None), mesh.degree
-    if scene.structure.mesh_file is not None:  # degree 3 locks on no shape of its cells
-        elements, degree = None, degree if "degree" in mesh.model_fields_set else 3
-    own = Setting(({"theory": scene.model.theory},), elements, degree)
+    elements = None if scene.structure.mesh_file is not None else getattr(mesh, "elements", None)
+    own = Setting(({"theory": scene.model.theory},), elements, degree_of(scene))
     return own if time is None else replace(own, scheme=time.scheme, tolerance=time.tolerance, step=time.step)
 
 
