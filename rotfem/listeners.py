@@ -1,8 +1,10 @@
-"""What hears of a computation while it goes on."""
+"""What hears of a computation while it goes on, and the time that it takes."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from time import process_time
 
 #: Takes the share of the work done, between 0 and 1.
 Progress = Callable[[float], None]
@@ -13,3 +15,19 @@ Hint = Callable[[str], None]
 
 def silent(line: str) -> None:
     """Take a hint and say nothing."""
+
+
+def cpu_time() -> float:
+    """Return the CPU time (s) of this process and of what it called, such as compilers."""
+    called = os.times()
+    return process_time() + called.children_user + called.children_system
+
+
+class Compiling:
+    """What compilation of forms has taken so far.
+
+    Attributes:
+        seconds: CPU time on this process, s.
+    """
+
+    seconds = 0.0

@@ -25,6 +25,7 @@ from ufl.constantvalue import Zero
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
+from rotfem.listeners import Compiling, cpu_time
 from rotfem.numerics import form_cache, traversal
 
 traversal.install()
@@ -372,7 +373,7 @@ form_data.preprocess_form = _preprocess_form
 
 def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str]) -> tuple[list[Any], Any]:
     """Return (compiled objects, module): rank 0 finds or makes the library, all ranks load that one."""
-    library, failure = None, None
+    library, failure, began = None, None, cpu_time()
     if comm.rank == 0:
         try:
             library = form_cache.library(
@@ -381,6 +382,7 @@ def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str])
         except Exception as error:
             failure = error
     library, why = comm.bcast((library, repr(failure)))
+    Compiling.seconds += cpu_time() - began
     if library is None:
         raise failure or RuntimeError(f"rank 0 could not compile a form: {why}")
     out: tuple[list[Any], Any] = library.load()

@@ -16,16 +16,14 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from time import process_time
 from typing import Any, Generic, Self, TypeVar
 
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError, InputError
-from rotfem.listeners import Hint
+from rotfem.listeners import Compiling, Hint, cpu_time
 
 R = TypeVar("R")
 
@@ -235,12 +233,6 @@ def grown(
 # --- time ------------------------------------------------------------------------------------------------------------
 
 
-def cpu_time() -> float:
-    """Return the CPU time (s) of this process and of what it called, such as compilers."""
-    called = os.times()
-    return process_time() + called.children_user + called.children_system
-
-
 class TooDear(ComputationError):
     """An answer would take more than what is left of the budget."""
 
@@ -260,11 +252,15 @@ class Clock:
     ):
         self.budget, self.comm, self.key, self._announce = budget, comm, key, announce or (lambda line: None)
         self.wanted: float | None = None
-        self._started, self._began, self._next = cpu_time(), 0.0, 1
+        self._started, self._compiling, self._began, self._next = cpu_time(), Compiling.seconds, 0.0, 1
 
     def used(self) -> float:
         """Return what has been used so far, s."""
         return float(self.comm.bcast(cpu_time() - self._started))
+
+    def compiled(self) -> float:
+        """Return what compilation has taken since the last answer began, s."""
+        return float(self.comm.bcast(Compiling.seconds - self._compiling))
 
     def begin(self, words: str, number: int, predicted: float | None) -> None:
         """Take note that answer `number` begins, of a setting in words, in a predicted time (s; None: not known).
@@ -272,7 +268,7 @@ class Clock:
         Raises:
             TooDear: that is more than what is left.
         """
-        self._began, self._next = self.used(), 1
+        self._began, self._compiling, self._next = self.used(), Compiling.seconds, 1
         if self.budget is not None and predicted is not None and predicted > self.budget - self._began:
             raise self._dear(predicted)
         if predicted is not None and predicted > 5.0:
@@ -287,7 +283,8 @@ class Clock:
         if self.budget is None or steps < self._next:
             return
         self._next = steps + max(1, steps // 8)
-        left, elapsed = self.budget - self._began, self.used() - self._began
+        start = self._began + self.compiled()
+        left, elapsed = self.budget - start, self.used() - start
         # a third of what is left shows how long adaptive steps take
         if elapsed > left or (elapsed > left / 3 and elapsed > left * done):
             raise self._dear(elapsed / done if done > 0.0 else None)
@@ -315,7 +312,7 @@ class Answer(Generic[R]):
     Attributes:
         setting: how it was computed.
         error: `time`, `space`, `model`, … and `total`, relative.
-        seconds: CPU time that it took.
+        seconds: CPU time that it took, without compilation.
         result: what was computed.
     """
 
@@ -389,8 +386,9 @@ def refine(
                     raise
                 found.failure = failure
             continue
-        answer = Answer(setting, error, clock.used() - began, result)
-        found.tried.append({**setting.summary(), "error": error["total"], "seconds": answer.seconds})
+        seconds = clock.used() - began
+        answer = Answer(setting, error, seconds - clock.compiled(), result)
+        found.tried.append({**setting.summary(), "error": error["total"], "seconds": seconds})
         same = found.best is not None and is_known(error) and error == found.best.error
         if found.best is None or answer.rank <= found.best.rank:
             found.best = answer

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from rotfem.commands.accuracy import Missed, to_accuracy
 from rotfem.errors import ComputationError, Stopped
+from rotfem.listeners import Compiling
 from rotfem.refinement.distance import distance
 from rotfem.refinement.refine import HIGHEST, MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
 from rotfem.scene import Scene
@@ -175,6 +176,21 @@ def test_what_is_too_dear_is_said_with_what_to_try(monkeypatch: pytest.MonkeyPat
     assert caught.value.result.summary["accuracy"]["budget"]["wanted"] > 10.0
     with pytest.raises(TooDear):  # nothing was reached
         to_accuracy(SCENE, SETTING, attempts(TooDear("nothing is left"))[1], clock(60.0))
+
+
+def test_what_is_compiled_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first answer takes 10 s, 9.9 s of them compilation: the second is not expected to take as long."""
+    now = [0.0]
+    monkeypatch.setattr("rotfem.refinement.refine.cpu_time", lambda: now[0])
+    monkeypatch.setattr(Compiling, "seconds", 0.0)
+    answers = iter([result(2e-3), result(1e-5)])
+
+    def attempt(setting: Setting) -> Any:
+        now[0] += 10.0 - Compiling.seconds
+        Compiling.seconds = 9.9
+        return next(answers)
+
+    assert to_accuracy(SCENE, SETTING, attempt, clock(12.0)).summary["accuracy"]["met"]
 
 
 def test_an_answer_that_is_too_dear_ends_while_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:

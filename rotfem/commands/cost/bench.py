@@ -29,9 +29,10 @@ from rotfem.commands.problem import Problem
 from rotfem.commands.run import Simulation
 from rotfem.commands.run_store import RunStore
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
+from rotfem.listeners import cpu_time
 from rotfem.refinement.coarser import lines
 from rotfem.refinement.distance import COLUMNS
-from rotfem.refinement.refine import Clock, Setting, TooDear, cpu_time
+from rotfem.refinement.refine import Clock, Setting, TooDear
 from rotfem.results.files import opened, writing
 from rotfem.scene import Scene
 from rotfem.version import __version__
