@@ -160,7 +160,6 @@ class RadauIIA(Scheme):
     stages: ClassVar[int] = 3
     estimate: ClassVar[tuple[float, int, float]] = (1 / 14400, 6, 0.2)
     growth: ClassVar[float] = 5.0
-    remembers: ClassVar[type] = Before
 
     def start(self, state: State) -> State:
         """Return the state without a step before it."""

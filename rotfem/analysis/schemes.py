@@ -190,9 +190,6 @@ class Scheme(ABC):
     estimate: ClassVar[tuple[float, int, float]] = (1 / 12, 3, 0.3)
     growth: ClassVar[float] = 2.0
 
-    #: Type of what a state remembers of the steps before, where it does.
-    remembers: ClassVar[type] = np.ndarray
-
     @abstractmethod
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return stage i of a step.
