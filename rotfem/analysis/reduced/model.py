@@ -56,8 +56,8 @@ class ReducedModel:
 
     # --- the basis ---------------------------------------------------------------------------------------------------
 
-    def grow(self, columns: Array, most: int | None = None, least: float = 0.0) -> int:
-        """Add to the basis what columns span outside it, shapes of largest strain energy first; return how many.
+    def grow(self, columns: Array, most: int | None = None, least: float = 0.0, motion: Array | None = None) -> int:
+        """Add to the basis what columns span outside it, the largest shapes first; return how many.
 
         A column is distinguished from round-off where it has 1e-15 of its energy outside, the squared error of a
         solution with a stiffness of condition 1e8.
@@ -65,7 +65,9 @@ class ReducedModel:
         Args:
             columns: local dof arrays, shape (n, k).
             most: number of shapes that are added; all if None.
-            least: twice the strain energy that a shape must have outside the basis.
+            least: size that a shape must have outside the basis, as a part of the motion: in the root of its strain
+                energy, or at the tip, which may have little of it.
+            motion: coordinates (n, m) of the motion; without it the size is the root of the energy.
         """
         X, V = columns[self.owned], self.V[self.owned]
         whole = np.asarray(summed(self.comm, np.einsum("ij,ij->j", X, self._strained(X))))
@@ -73,10 +75,18 @@ class ReducedModel:
             X = X - V @ summed(self.comm, self._strained(V).T @ X)
         gram = summed(self.comm, X.T @ self._strained(X))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = np.flatnonzero(energies > max(least, 1e-15 * float(whole.max(initial=0.0))))[::-1][:most]
+        sure = energies > 1e-15 * float(whole.max(initial=0.0))
+        sizes, X = np.sqrt(energies[sure]), X @ turns[:, sure]
+        parts = sizes
+        if motion is not None:
+            at_tip = np.linalg.norm(self.tips(with_ghosts(self.system.V, X))[self.system.structure.moves], axis=0)
+            parts = sizes / np.linalg.norm(motion, axis=1).max(initial=1e-300)
+            parts += at_tip / max(self.largest(motion @ self.tips().T), 1e-300)
+        keep = np.flatnonzero(parts > least)
+        keep = keep[np.argsort(-parts[keep], kind="stable")][:most]
         if not len(keep):
             return 0
-        new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])
+        new = np.hstack([V, X[:, keep] / sizes[keep]])
         self.take(with_ghosts(self.system.V, orthonormal(self.comm, new, self._strained)))
         return len(keep)
 

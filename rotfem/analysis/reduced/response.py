@@ -2,7 +2,8 @@
 
 What the basis V lacks is in the residual r = M V η̈ + C V η̇ + K V η + f of the full system, which the reduced equations
 make orthogonal to V. Its static solution K⁻¹ r is what the basis grows by, at those instants of the history where the
-accelerations are largest, shapes of most energy first (a greedy basis, Quarteroni, Manzoni & Negri 2016, chapter 7).
+accelerations are largest, first the shapes that are largest in energy or at the tip (a greedy basis, Quarteroni,
+Manzoni & Negri 2016, chapter 7).
 The error by the basis is the difference that the last shapes have made, that by the steps the difference between the
 steps and those of half the length, that of the linear theory the difference that its foreshortening makes.
 """
@@ -27,7 +28,7 @@ Array = npt.NDArray[np.float64]
 #: Most columns of a basis.
 MOST = 60
 
-#: Part of an accuracy below which the amplitude of a shape is of no account.
+#: Part of an accuracy below which a shape is of no account, as a part of the motion.
 NEGLIGIBLE = 0.01
 
 #: Accuracy that is asked for if none is.
@@ -130,8 +131,7 @@ def reduced_response(
         if basis_error <= accuracy or model.size >= MOST:
             break
         before = tips
-        least = (NEGLIGIBLE * accuracy) ** 2 * float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
-        if model.grow(growth.lacking(equations, solution, states), 6, least) == 0:
+        if model.grow(growth.lacking(equations, solution, states), 6, NEGLIGIBLE * accuracy, states[0]) == 0:
             basis_error = NEGLIGIBLE * accuracy if model.size else 0.0
             break
     for _ in range(10 if model.size else 0):
