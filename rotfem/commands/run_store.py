@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -35,6 +37,22 @@ def interval(text: str | int) -> float | int:
         allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'
         raise SceneError("command line", "--checkpoint", text, allowed)
     return float(found[1]) if found[2] else int(found[1])
+
+
+@contextmanager
+def checkpoint_of(path: Path) -> Iterator[None]:
+    """Say in one error that the content of a checkpoint is not that of this program, as of another state of it.
+
+    Raises:
+        SceneError: in the place of what goes wrong with it.
+    """
+    try:
+        yield
+    except (SceneError, OSError):
+        raise
+    except Exception as error:  # of any kind, as anything may lie anywhere
+        what = f"holds something else than this rotfem writes ({type(error).__name__}); start anew, without --resume"
+        raise SceneError("command line", "--resume", path, what) from None
 
 
 class RunStore:
@@ -92,8 +110,9 @@ class RunStore:
         self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
 
         def read(files: ResultSet) -> Tree:
-            tree = read_checkpoint(path)
-            check_identity(path, tree, self._identity, end)
+            with checkpoint_of(path):
+                tree = read_checkpoint(path)
+                check_identity(path, tree, self._identity, end)
             return tree
 
         if self.resume:
@@ -131,7 +150,8 @@ class RunStore:
             return None
         state, path = None, self.folder.path / CHECKPOINT
         if self._tree is not None:
-            state = run.put_back(path, self._tree)
+            with checkpoint_of(path):
+                state = run.put_back(path, self._tree)
             run.log.resumed.append({"time": state.t, "ranks": self.comm.size})
         keep = (CHECKPOINT,) if self._tree is not None else ()
         self._tree = None  # a richer model would start afresh

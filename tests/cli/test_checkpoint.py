@@ -310,6 +310,22 @@ def test_a_checkpoint_that_cannot_be_written_is_no_end(tmp_path: Path, monkeypat
     assert sorted(os.listdir(tmp_path)) == ["fields.h5", "fields.xdmf", "history.csv", "shape.csv", "summary.json"]
 
 
+def test_what_another_state_of_the_program_wrote_is_refused_in_words(checkpoint: Path, rotfem: Any) -> None:
+    whole = checkpoint_file.read_checkpoint(checkpoint)
+    (own,) = whole["processes"]
+    for wrong in (
+        {},
+        [],
+        {**whole, "versions": None},
+        {**whole, "rows": "x"},
+        {**whole, "processes": [{**own, "state": 3.0}]},
+        {**whole, "processes": [{**own, "stepper": {}}]},
+        {**whole, "processes": None},
+    ):
+        checkpoint_file.write_checkpoint(checkpoint, wrong)
+        assert "something else than this rotfem writes" in refused(rotfem, "--resume")
+
+
 @dataclass
 class Link:
     """A record outside the program."""
