@@ -33,7 +33,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     seen, signals = watched(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
     system: Any
-    if problem.theory.linear and moving:  # its pieces are held apart, 14 kB for each unknown of a plate
+    if problem.theory.linear and moving:  # its pieces are held apart, 12 kB for each unknown of a plate
         V, file = model.structure.V, getattr(problem.structure, "mesh", None)
         key, value = ("mesh.elements", problem.mesh.elements) if file is None else ("structure.mesh", str(file))
         nodes, components, dimension = V.dofmap.index_map.size_global, V.dofmap.index_map_bs, V.mesh.topology.dim

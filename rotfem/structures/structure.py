@@ -85,7 +85,7 @@ def memory() -> float:
 class TipValues:
     """Reads a blocked Lagrange function at a point: Σ_k φ_k q_k over the nodes of a cell that holds it.
 
-    That of the nearest node if no cell does, as beside a curved edge.
+    That of the nearest node if no cell does, as at a curved edge.
 
     Attributes:
         dofs: local numbers of the unknowns of those nodes that this process owns, (nodes, unknowns of a node).

@@ -13,7 +13,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +39,7 @@ from rotfem.version import __version__
 Array = npt.NDArray[np.float64]
 
 #: Values of an output, numbers of unknowns, steps and Newton iterations, and the lines of the mesh (see `lines`).
-Output = tuple[Array, tuple[int, int, int], list[list[float]]]
+Output = tuple[Array, tuple[int, int, int], list[Array]]
 
 
 @dataclass
@@ -69,7 +68,7 @@ class Measurement:
     dofs: int = 0
     steps: int = 0
     iterations: int = 0
-    lines: list[list[float]] = field(default_factory=list)
+    lines: list[Array] = field(default_factory=list)
 
     def median(self, name: str) -> float:
         """Return the median of `wall`, `cpu`, `setup` or `setup_cpu`, s; nan where nothing was measured."""
@@ -182,7 +181,7 @@ class Bench:
             columns = [x for name, x in result.history.items() if name.startswith(COLUMNS["tip"])]
             s = result.summary
             counts = s["dofs"], s["steps"], s["newton_iterations"]
-            return np.column_stack(columns), counts, mesh_lines(simulation.system)
+            return np.column_stack(columns), counts, lines(simulation.system)
 
         return go
 
@@ -195,7 +194,7 @@ class Bench:
             values = analysis.at(speed, variant.modes.count).pairs.values[: variant.modes.count]
             dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
             counts = dofs, 0, analysis.newton.iterations
-            return np.column_stack([values.imag, values.real]), counts, mesh_lines(analysis.system)
+            return np.column_stack([values.imag, values.real]), counts, lines(analysis.system)
 
         return go
 
@@ -208,14 +207,9 @@ class Bench:
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
             values = np.array([[frequency] for _, frequency in rows])
             counts = result.summary["dofs"], result.summary["speeds_solved"], 0
-            return values, counts, mesh_lines(analysis.system)
+            return values, counts, lines(analysis.system)
 
         return go
-
-
-def mesh_lines(system: Any) -> list[list[float]]:
-    """Return the coordinates (m) of the vertices of a system's mesh along each axis."""
-    return [list(map(float, x)) for x in lines(system)]
 
 
 # --- what is kept ----------------------------------------------------------------------------------------------------
