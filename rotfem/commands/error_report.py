@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -25,7 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import HistoryErrors, richer_problem
-from rotfem.refinement.distance import COLUMNS, OUTPUTS, Output, largest, tip
+from rotfem.refinement.distance import COLUMNS, OUTPUTS, Output, largest, sizes, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
 from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
@@ -299,10 +299,18 @@ def output_of(scene: Scene) -> str:
     return scene.accuracy_of if scene.accuracy_of in OUTPUTS else "tip"
 
 
-def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError | None) -> ErrorEstimate:
-    """Return the largest relative error of the frequencies of rows."""
+def error_of_modes(rows: Sequence[Mapping[str, Any]], theory: TheoryError | None) -> ErrorEstimate:
+    """Return the largest error of the eigenvalues of rows, relative to each.
+
+    Of one that is zero to round-off it is relative to the least at the same speed that is not.
+    """
     flexible = [row for row in rows if row.get("stability") != "neutral"]
-    mesh = [row["mesh_error"] for row in flexible]
-    bound = float(max((row["error_bound"] for row in flexible), default=0.0))
+    mesh, bound = [row["mesh_error"] for row in flexible], 0.0
+    for speed in {row.get("speed") for row in flexible}:
+        there = [row for row in flexible if row.get("speed") == speed]
+        bounds, found = np.array([(row["error_bound"], complex(row["growth"], row["frequency"])) for row in there]).T
+        with np.errstate(over="ignore"):  # none of them is resolved
+            of_others = np.abs(bounds * found) / sizes(np.where(np.abs(bounds) < 1.0, found, 0.0))
+        bound = max(bound, float(np.minimum(np.abs(bounds), of_others).max()))
     space = None if None in mesh else float(max(mesh, default=0.0))
     return ErrorEstimate({"space": space, "model": None if theory is None else theory.estimate, "round_off": bound})

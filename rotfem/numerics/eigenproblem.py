@@ -300,6 +300,8 @@ class Pencil(Sendable):
     def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
         """Return at least `count` pairs (fewer if there are no more) of smallest |λ|, sorted by |λ|.
 
+        A double zero, as of a hinge without a spring, is one of them, though round-off may part it into ±λ.
+
         Args:
             count: number of pairs; of conjugate ones, one counts.
             target: shift, away from zero where zero is an eigenvalue (1/s).
@@ -308,9 +310,12 @@ class Pencil(Sendable):
             ComputationError: the solver did not converge, or a pair's backward error is above BACKWARD_TOLERANCE.
         """
         try:
-            return self._solve(count, target)
+            pairs = self._solve(count, target)
         except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
-            return self._solve(count, 0.1 * self._smallest)
+            pairs = self._solve(count, 0.1 * self._smallest)
+        lam = pairs.values
+        opposite = np.abs(lam[1:] + lam[:-1]) < ZERO * np.abs(lam[1:])
+        return pairs.select(np.flatnonzero(np.append(True, ~opposite | (pairs.bounds[1:] < 1.0))[: len(lam)]))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
         if sparse_part(self.C) is not self.C:  # SLEPc's solver takes sparse matrices alone

@@ -45,14 +45,22 @@ def distance(one: Array, other: Array) -> float:
 
 
 def distance_each(one: Array, other: Array) -> float:
-    """Return the largest distance of two lists of eigenvalues, complex or (n, components), each relative to itself.
+    """Return the largest distance of two lists of eigenvalues, complex or (n, components), each relative to `sizes`.
 
-    One that is zero is compared with the least that is not. Of lists of different length the first ones are compared.
+    Of lists of different length the first ones are compared.
     """
-    sizes = [float(np.linalg.norm(a)) for a in one]
-    least = min(filter(None, sizes), default=1e-300)
-    pairs = zip(one, other, sizes, strict=False)
-    return max((float(np.linalg.norm(b - a)) / (size or least) for a, b, size in pairs), default=0.0)
+    pairs = zip(one, other, sizes(one), strict=False)
+    return max((float(np.linalg.norm(b - a) / size) for a, b, size in pairs), default=0.0)
+
+
+def sizes(values: Array) -> Array:
+    """Return what errors of eigenvalues, complex or (n, components), are relative to, (n,): their absolute values.
+
+    Of one that is zero it is the least that is not.
+    """
+    out = np.array([np.linalg.norm(a) for a in values])
+    out[out == 0.0] = min(out[out > 0.0], default=1e-300)
+    return out
 
 
 def largest(values: Array) -> float:

@@ -120,10 +120,7 @@ class Case:
         spinning = plainly(system, lambda: analysis.at(speed, self.mode_count))
         names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
         lasting = [not name.endswith(", fast") for name in names]  # overdamped ones have two eigenvalues
-        values, resolved = (x[: len(names)] for x in (spinning.pairs.values, spinning.pairs.resolved))
-        # a double zero, as of a hinge, that round-off has parted into ±λ is one mode
-        twins = (resolved == 0.0) & (np.abs(values + np.roll(values, 1).conj()) <= 1e-3 * np.abs(values))
-        return np.asarray(resolved[lasting & ~twins])
+        return np.asarray(spinning.pairs.resolved[: len(names)][lasting])
 
 
 def plainly(system: Any, compute: Callable[[], T]) -> T:

@@ -33,6 +33,7 @@ from rotfem.numerics.linear import SMALL
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed, with_ghosts
 from rotfem.refinement.coarser import interpolation, on_other_mesh
+from rotfem.refinement.distance import sizes
 
 Array = npt.NDArray[Any]
 
@@ -49,7 +50,7 @@ class FrequencyErrors:
 
     Attributes:
         there: analysis of the problem on another mesh or in that theory; None where there is nothing to compare with.
-        values: λ there, at the speed of the last call.
+        values: λ there, at the speed of the last call; and `resolved`, zero where they are so to round-off.
         carried: their vectors at the nodes of the analysed mesh, without the hub; None where it has others.
     """
 
@@ -57,6 +58,7 @@ class FrequencyErrors:
         self.analysis, self.richer = analysis, richer
         self.there: ModalAnalysis | None = None
         self.values: Array = np.empty(0)
+        self.resolved: Array = np.empty(0)
         self.carried: Array | None = None
         self._speed: float | None = None
         self._before: Spinning | None = None
@@ -67,12 +69,11 @@ class FrequencyErrors:
         self._error: Callable[[float], float] = float
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
-        """Return the relative error of every eigenvalue; None where it is unknown."""
-        lam = spinning.pairs.values
+        """Return the error of every eigenvalue relative to `sizes`, as far as they are resolved; None if unknown."""
+        lam = spinning.pairs.resolved
         if not len(lam) or not self._found(spinning.speed, len(lam) + int(spinning.rigid)):
             return [None] * len(lam)
-        differences = np.abs(self._matched(spinning) - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
-        return [self._error(float(d)) for d in differences]
+        return [self._error(float(d)) for d in np.abs(self._matched(spinning) - lam) / sizes(lam)]
 
     def near(self, speed: float, count: int) -> Array | None:
         """Return the modes on half the cells as columns of the analysed mesh, if it is large; its matrices are freed.
@@ -101,7 +102,7 @@ class FrequencyErrors:
             self._before = there.at(speed, min(count + SPARE, most), self._before, keep=False)
         except (ComputationError, InputError, np.linalg.LinAlgError):
             return False
-        self.values = self._before.pairs.values
+        self.values, self.resolved = self._before.pairs.values, self._before.pairs.resolved
         if self._weights is not None:
             V, clamped, size = there.system.V, self._before.clamped, self.analysis.structure.size
             shapes = there.right(self._before)[: V.dofmap.index_map.size_local * size]
@@ -141,7 +142,7 @@ class FrequencyErrors:
             alike = np.abs(summed(self.analysis.comm, products)) / self._sizes
             # as much alike are shapes within 25 degrees of the mode
             apart[alike < 0.9 * np.max(alike, axis=1, keepdims=True)] = np.inf
-        return np.asarray(values[np.argmin(apart, axis=1)])
+        return np.asarray(self.resolved[np.argmin(apart, axis=1)])
 
 
 def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float, newton: Newton) -> float | None:
@@ -170,7 +171,7 @@ def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time:
     lam, (away, rate) = pairs.values, ((x[: len(pairs.right), None]).astype(complex) for x in (q - rest, v))
     moved = summed(system.comm, pairs.left.conj().T @ pencil.apply(pencil.M, rate))
     part = (pencil.gram(pairs.left, lam, away, np.zeros(1)) + moved)[:, 0] / np.diag(spinning.own)
-    change = np.array(errors, dtype=float) * np.abs(lam)
+    change = np.array(errors, dtype=float) * sizes(pairs.resolved)
     lasting = np.minimum(time, 1.0 / np.maximum(-lam.real, 1.0 / time))
     out = np.abs(part) * np.minimum(change * lasting, 2.0)  # which is out of phase
     tip = tip_output(system).read
