@@ -45,26 +45,14 @@ if TYPE_CHECKING:
     from rotfem.mechanics.motion import MotionLaw as MotionLaw
     from rotfem.mechanics.problem import Output as Output
     from rotfem.mechanics.theories import Theory as Theory
-    from rotfem.results import (
-        CampbellResult as CampbellResult,
-    )
-    from rotfem.results import (
-        CheckResult as CheckResult,
-    )
-    from rotfem.results import (
-        ExplainResult as ExplainResult,
-    )
-    from rotfem.results import (
-        ModesResult as ModesResult,
-    )
-    from rotfem.results import (
-        ResponseResult as ResponseResult,
-    )
-    from rotfem.results import (
-        RunResult as RunResult,
-    )
+    from rotfem.results.campbell import CampbellResult as CampbellResult
     from rotfem.results.compare import CompareResult as CompareResult
     from rotfem.results.compare import compare as compare
+    from rotfem.results.modes import ModesResult as ModesResult
+    from rotfem.results.modes import ResponseResult as ResponseResult
+    from rotfem.results.of_scene import CheckResult as CheckResult
+    from rotfem.results.of_scene import ExplainResult as ExplainResult
+    from rotfem.results.run import RunResult as RunResult
     from rotfem.results.sweep import SweepResult as SweepResult
     from rotfem.scene import BeamMesh as BeamMesh
     from rotfem.scene import PlateMesh as PlateMesh

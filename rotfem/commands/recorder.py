@@ -72,15 +72,6 @@ class ResultantRows:
         """Return the largest equivalent stress (Pa), where (m) and when (s)."""
         return dict(zip((STRESS, "x", "y", "t"), self.largest, strict=False))
 
-    def known(self) -> dict[str, Any]:
-        """Return what a checkpoint has of it."""
-        return {"frames": vars(self.frames), "last": self.last, "largest": self.largest}
-
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        vars(self.frames).update(known["frames"])
-        self.last, self.largest = known["last"], known["largest"]
-
 
 class StationRows:
     """Takes the states of every so many rows of a history of a beam, and keeps what is asked for at its stations.
@@ -109,14 +100,6 @@ class StationRows:
             check_finite(zip(self.names, map(float, values.sum(axis=0)), strict=True), t, " at the stations")
             self.kept.append((t, values))
         self.seen += 1
-
-    def known(self) -> dict[str, Any]:
-        """Return what a checkpoint has of it."""
-        return {"seen": self.seen, "kept": self.kept}
-
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        self.seen, self.kept = known["seen"], known["kept"]
 
     def result(self) -> StationHistory:
         """Return what has been kept."""

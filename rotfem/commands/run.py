@@ -25,7 +25,6 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise, hints_of_start
-from rotfem.commands.checkpoint import Memory
 from rotfem.commands.error_report import RunErrors, check_rotations, output_of
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
@@ -34,7 +33,7 @@ from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Recorder, reduced_history
-from rotfem.commands.run_store import RunStore, interval
+from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent

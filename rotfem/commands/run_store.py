@@ -1,29 +1,220 @@
-"""What of a run is on disk while it goes on: the rows of its history, and checkpoints."""
+"""What of a run is on disk while it goes on: the rows of its history, and checkpoints.
+
+A checkpoint holds what a run must know to go on as if it had never ended: of every object that learns, all attributes
+but the parts that a run makes anew. Of a shared mesh each process keeps its own arrays. A kept factor is that of a
+tangent at a state, which is kept in its place.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from time import monotonic
+from time import monotonic, perf_counter
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Tree, check_identity, comparable, identity
+from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
+from rotfem.commands.monitor import Log, Monitor
+from rotfem.commands.recorder import Recorder
 from rotfem.errors import OutputError, SceneError, Stopped
+from rotfem.refinement.companion import Companion
 from rotfem.refinement.refine import Setting
 from rotfem.results.checkpoint_file import read_checkpoint, write_checkpoint
 from rotfem.results.files import CHECKPOINT
 from rotfem.results.result_set import ResultFolder, ResultSet, read_summary
 from rotfem.results.run import LiveTable
-from rotfem.scene import Scene
+from rotfem.scene import Scene, Time
+from rotfem.version import versions
+
+Tree = dict[str, Any]
 
 #: Seconds after which ranks tell each other of signals: mpirun gives its processes a quarter of a second.
 TALK = 0.05
+
+#: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
+_STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observers", "_linearised", "_about")
+APART = {
+    "Log": ("started", "elapsed", "advice"),
+    "Monitor": ("system", "critical", "farthest"),
+    "Farthest": ("system",),
+    "StationRows": ("output", "names", "_stations", "_columns"),
+    "ResultantRows": ("names", "frames", "_resultants", "_nodes", "_columns", "_stress"),
+    "Stepper": _STEPPER,
+    "FollowingStepper": (*_STEPPER, "followed", "carried", "_there", "_curves"),
+    "Companion": ("system", "followed", "output", "interval", "stepper", "further", "_step"),
+}
+
+
+# --- what a checkpoint holds ------------------------------------------------------------------------------------------
+
+
+def identity(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> Tree:
+    """Return all that a run depends on, but for its end: scene, content of a mesh file, names of what scripts added."""
+    mesh = scene.structure.mesh_file
+    content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
+    tables = comparable(scene.digest())
+    tables.get("time", {}).pop("end", None)
+    return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
+
+
+def comparable(scene: Any) -> Any:
+    """Return the tables of a scene as a file has them, without those that nothing computed depends on."""
+    tables = json.loads(json.dumps(scene, default=str))
+    return {k: v for k, v in tables.items() if k not in ("name", "limits")} if isinstance(tables, dict) else tables
+
+
+def differences(there: Any, here: Any, key: str = "") -> list[str]:
+    """Return which keys of two identities differ, and how."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        keys = list(dict.fromkeys([*there, *here]))
+        return [line for k in keys for line in differences(there.get(k), here.get(k), f"{key}.{k}" if key else k)]
+    if there == here:
+        return []
+    shown = [value if len(value) <= 40 else value[:39] + "…" for value in map(json.dumps, (there, here))]
+    return [f"{key.removeprefix('scene.')} is {shown[0]} there and {shown[1]} here"]
+
+
+def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
+    """Refuse a checkpoint of another run, or one that lies after an end (s).
+
+    Raises:
+        SceneError: it is of another scene, or of another version of the program; says what differs.
+    """
+    there, here = tree["versions"]["rotfem"], versions()["rotfem"]
+    if there != here:
+        why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
+        raise SceneError("command line", "--resume", path, why)
+    lines = differences(tree["identity"], mine)
+    if lines:
+        more = f", and {len(lines) - 4} more" if len(lines) > 4 else ""
+        raise SceneError("command line", "--resume", path, f"is of another run: {'; '.join(lines[:4])}{more}")
+    if end < tree["t"]:
+        raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
+
+
+@dataclass
+class Memory:
+    """What of a run a checkpoint holds: what marches, and what observes it; without a stepper nothing can be kept."""
+
+    time: Time
+    system: Any
+    stepper: Stepper | None
+    record: Recorder
+    monitor: Monitor
+    log: Log
+    companions: Sequence[Companion]
+    setting: Setting | None
+
+    @property
+    def _common(self) -> list[Any]:
+        """Objects that are the same on all ranks."""
+        rows = self.record.resultants
+        return [self.log, self.record.stations, rows, rows and rows.frames]
+
+    @property
+    def _own(self) -> list[Any]:
+        """Objects that have arrays of a rank."""
+        return [self.monitor, self.monitor.farthest, self.record.snapshots, *self.companions]
+
+    def taken(self, state: State, mine: Tree) -> Tree:
+        """Return what the run knows at a state, on rank 0.
+
+        Args:
+            state: the state at the end of the last step.
+            mine: identity of the run.
+        """
+        record, comm = self.record, self.system.comm
+        assert self.stepper is not None
+        own = {
+            "positions": self.system.V.tabulate_dof_coordinates(),
+            "state": state.changed(inner=()),
+            "stepper": of_stepper(self.stepper),
+            "parts": [known(part) for part in self._own],
+            "companions": [of_stepper(companion.stepper) for companion in self.companions],
+        }
+        return {
+            "identity": mine,
+            "versions": versions(),
+            "t": state.t,
+            "elapsed": self.log.elapsed + perf_counter() - self.log.started,
+            "factorisations": self.system.factorisations,
+            "rows": np.array(record.history.rows()).reshape(len(record.history), -1),
+            "parts": [known(part) for part in self._common],
+            "settings": None if self.setting is None else vars(self.setting),
+            "processes": comm.gather(own),
+        }
+
+    def put_back(self, path: Path, tree: Tree) -> State:
+        """Make the run know what a checkpoint says; return the state to go on from.
+
+        Raises:
+            SceneError: the mesh is another one, or other processes share it.
+        """
+        comm, here, ranks = self.system.comm, self.system.V.tabulate_dof_coordinates(), len(tree["processes"])
+        if ranks != comm.size:
+            why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
+            raise SceneError("command line", "--resume", path, why)
+        own = tree["processes"][comm.rank]
+        there, near = own["positions"], 1e-9 * float(np.max(np.ptp(here, axis=0)))
+        same = there.shape == here.shape and bool(np.max(np.abs(there - here)) <= near)
+        if not comm.allreduce(same, MPI.LAND):
+            raise SceneError("command line", "--resume", path, "is of another mesh")
+        state: State = own["state"]
+        assert self.stepper is not None
+        for part, values in zip([*self._common, *self._own], [*tree["parts"], *own["parts"]], strict=True):
+            if part is not None:
+                vars(part).update(values)
+        self.log.elapsed = tree["elapsed"]
+        for row in tree["rows"]:
+            self.record.history.append(row)
+        put_back_stepper(self.stepper, own["stepper"], state)
+        self.system.held.factored_before = tree["factorisations"] - self.system.held.factorisations
+        for companion, learnt in zip(self.companions, own["companions"], strict=True):
+            if companion.state is not None:
+                put_back_stepper(companion.stepper, learnt, companion.state)
+        return state
+
+
+def known(thing: Any) -> Tree | None:
+    """Return the attributes of an object but those in `APART`; None of nothing."""
+    apart = APART.get(type(thing).__name__, ())
+    return None if thing is None else {name: value for name, value in vars(thing).items() if name not in apart}
+
+
+def learning(stepper: Stepper) -> dict[str, Any]:
+    """Return a stepper and its parts that learn from its steps, by name."""
+    parts = ("newton", "back_off", "scheme_back_off")
+    return {"own": stepper, **{name: getattr(stepper, name) for name in parts}}
+
+
+def of_stepper(stepper: Stepper) -> Tree:
+    """Return what a stepper has learnt, and what its matrices and its factor are about."""
+    about = {"matrices": stepper.matrices, "factored": stepper.system.held.factored}
+    return {name: known(part) for name, part in learning(stepper).items()} | about
+
+
+def put_back_stepper(stepper: Stepper, tree: Tree, state: State) -> None:
+    """Make a stepper know what it had learnt at a state; its factor and its matrices are made anew."""
+    held = stepper.system.held
+    held.count_rotations_from(state.reference)
+    held.refactor(tree["factored"])
+    stepper.make_matrices(tree["matrices"])
+    held.count_rotations_from(state.reference)
+    stepper.system.set_time(state.t)
+    for name, part in learning(stepper).items():
+        vars(part).update(tree[name])
+
+
+# --- when it is written -----------------------------------------------------------------------------------------------
 
 
 def interval(text: str | int) -> float | int:
