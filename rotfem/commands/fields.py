@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from rotfem.results.files import writing
+from rotfem.results.files import whole_hdf5, write_whole
 from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import HALF_WIDTH, Surface
@@ -227,7 +226,7 @@ def write_xdmf(
     root = ET.Element("Xdmf", Version="3.0")
     series = ET.SubElement(ET.SubElement(root, "Domain"), "Grid", Name=path.stem, GridType="Collection")
     series.set("CollectionType", "Temporal")
-    with writing(path), h5py.File(heavy, "w") as file:
+    with whole_hdf5(heavy) as file:
         file["points"], file["cells"] = points, cells
         for number, (t, fields) in enumerate(frames):
             grid = ET.SubElement(series, "Grid", Name=path.stem, GridType="Uniform")
@@ -241,8 +240,8 @@ def write_xdmf(
                 what = "Vector" if values.ndim > 1 else "Scalar"
                 attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=what, Center="Node")
                 _refer(attribute, heavy.name, f"{name}/{number}", values)
-        ET.indent(root)
-        ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    ET.indent(root)
+    write_whole(path, ET.tostring(root, encoding="utf-8", xml_declaration=True))
     return [path, heavy]
 
 

@@ -118,7 +118,7 @@ def write_text(path: Path, text: str) -> Path:
     return write_whole(path, text.encode())
 
 
-def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
+def write_whole(path: Path, *content: bytes | memoryview, durable: bool = False) -> Path:
     """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path.
 
     Args:
@@ -148,6 +148,24 @@ def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
             with opened(path.parent, os.O_RDONLY) as folder:
                 os.fsync(folder)
     return path
+
+
+@contextmanager
+def whole_hdf5(path: Path) -> Iterator[Any]:
+    """Yield an HDF5 file (`h5py.File`) to be filled, which is written whole or not at all.
+
+    It is made in memory: HDF5 cannot close a file that there is no room for, and Python crashes where it ends.
+
+    Raises:
+        OutputError: it cannot be written; the one before is still there.
+    """
+    import h5py  # takes longer than all other imports of this package
+
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        yield file
+    with image.getbuffer() as content:
+        write_whole(path, content)
 
 
 def overwrite(path: Path, text: str) -> None:

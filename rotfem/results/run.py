@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import ShortTable, by_unit, described, largest, named, number
-from rotfem.results.files import csv_text, line, opened, write_text, writing
+from rotfem.results.files import csv_text, line, opened, whole_hdf5, write_text
 from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
 from rotfem.short import short_fields
 
@@ -73,9 +73,7 @@ class StationHistory:
         Raises:
             OutputError: it cannot be written.
         """
-        import h5py  # takes longer than all other imports of this package
-
-        with writing(path), h5py.File(path, "w") as file:
+        with whole_hdf5(path) as file:
             for name, values in {"t": self.t, "x": self.x, **self.values}.items():
                 data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
                 data.attrs["long_name"], data.attrs["units"] = described(name)
