@@ -90,7 +90,8 @@ def response(
         direct = answers_at(asked)
         if not len(per_rev) or low is not None or high is not None:
             given = asked[~peaks]
-            asked, direct = resolved(answers_at, asked, direct, answers.names, number)
+            infinite = spinning.pairs.values[undamped].imag
+            asked, direct = resolved(answers_at, asked, direct, answers.names, number, infinite)
             peaks = ~np.isin(asked, given)
         modal = answers.modal(asked, scene.modes.count)
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
@@ -149,7 +150,12 @@ def frequencies_of(
 
 
 def resolved(
-    answers_at: Callable[[Array], Array], omegas: Array, values: Array, outputs: Sequence[str], most: int
+    answers_at: Callable[[Array], Array],
+    omegas: Array,
+    values: Array,
+    outputs: Sequence[str],
+    most: int,
+    infinite: npt.ArrayLike = (),
 ) -> tuple[Array, Array]:
     """Return frequencies (rad/s) and answers, so close that amplitudes on a logarithmic scale run smoothly.
 
@@ -162,6 +168,7 @@ def resolved(
         values: the answers there, (frequencies, outputs).
         outputs: their names.
         most: frequencies that may be added.
+        infinite: frequencies of modes without damping; an interval that holds one is not halved.
     """
     least, left = NARROW * float(omegas[-1] - omegas[0]), most
     units = units_of(outputs)
@@ -174,6 +181,8 @@ def resolved(
         bend = np.max(np.abs(heights[1:-1] - (1 - part) * heights[:-2] - part * heights[2:]), axis=1)
         of_interval = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))
         of_interval[np.diff(omegas) < least] = 0.0
+        inside = np.searchsorted(omegas, infinite)
+        of_interval[inside[(inside > 0) & (inside < len(omegas))] - 1] = 0.0
         worst = np.argsort(-of_interval)[:left]
         chosen = np.sort(worst[of_interval[worst] > BEND])
         if not len(chosen):

@@ -36,6 +36,7 @@ from rotfem.scene.values import (
     as_symmetric_matrix,
     check_magnitudes,
     check_profile_length,
+    on_span,
 )
 
 
@@ -146,7 +147,7 @@ class BeamStructure(StructureTable):
             check_magnitudes(lambda: properties(section.knots), "section")
         for i, body in enumerate(self.masses):
             key = f"masses.{i}"
-            if not -ROUND_OFF <= body.x / self.length <= 1 + ROUND_OFF:
+            if not on_span(body.x, self.length):
                 raise problem(f"{key}.x", body.x, f"must be from 0 to the length {self.length:g}")
             if self.is_planar and body.offset[2] != 0.0:
                 raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
@@ -317,7 +318,7 @@ class SpatialBeamStructure(BeamStructure):
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
         straight = self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
         for i, support in enumerate(self.supports):
-            if not -ROUND_OFF <= support.x / self.length <= 1 + ROUND_OFF:
+            if not on_span(support.x, self.length):
                 raise problem(f"supports.{i}.x", support.x, f"must be from 0 to the length {self.length:g}")
         if self.supports and not straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"

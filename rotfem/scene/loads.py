@@ -14,7 +14,7 @@ from rotfem.scene.motion import Motion
 from rotfem.scene.signals import FORCE, MOMENT, PRESSURE, Harmonic, Kind, Signal, arguments
 from rotfem.scene.span_tables import is_path
 from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import ROUND_OFF, Number, PaddedVector, as_number, as_vector
+from rotfem.scene.values import Number, PaddedVector, as_number, as_vector, on_span
 
 
 class Load(Signal):
@@ -209,9 +209,9 @@ def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
         if load.VECTORS.sizes == MOMENT.sizes:
             _check_moment(key, structure, load)
         for x, *_ in load.span_rows:
-            if structure.length is not None and not -ROUND_OFF <= x / structure.length <= 1 + ROUND_OFF:
+            if not on_span(x, structure.length):
                 raise problem(
-                    key, None, f"x = {x:g} is not on the structure, which runs from 0 to {structure.length:g}"
+                    key, None, f"x = {x:.10g} is not on the structure, which runs from 0 to {structure.length:g}"
                 )
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
         if motion.is_free and per_rev is not None:
@@ -249,7 +249,7 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
     if len(x) != (2 if structure.type == "plate" else 1):
         allowed = "[x, y], m, for a plate" if structure.type == "plate" else f"a number, m, for a {structure.type}"
         raise problem(key, list(x), f"must be {allowed}")
-    if structure.length is not None and not -ROUND_OFF <= x[0] / structure.length <= 1 + ROUND_OFF:
+    if not on_span(x[0], structure.length):
         raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
 
 

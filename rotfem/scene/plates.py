@@ -28,6 +28,7 @@ from rotfem.scene.values import (
     check_magnitudes,
     check_profile_length,
     evaluate,
+    on_span,
 )
 
 
@@ -148,11 +149,10 @@ class PlateStructure(StructureTable):
             if self.thickness[0][0] != 0.0:
                 raise problem("thickness", self.thickness, "the taper must start at x = 0")
             check_profile_length("thickness", self.thickness, self.length)
-        if self.length is not None:
-            for x, _, _ in self.point_masses:
-                if not 0.0 <= x <= self.length:
-                    reason = f"x = {x:g} is not on the plate, which runs from 0 to {self.length:g}"
-                    raise problem("point_masses", self.point_masses, reason)
+        for x, _, _ in self.point_masses:
+            if not on_span(x, self.length):
+                reason = f"x = {x:.10g} is not on the plate, which runs from 0 to {self.length:g}"
+                raise problem("point_masses", self.point_masses, reason)
         if material.name == "orthotropic" and self.E1 is not None and self.E2 is not None and self.nu12 is not None:
             limit = math.sqrt(self.E1 / self.E2)
             if abs(self.nu12) >= limit:

@@ -22,7 +22,7 @@ from rotfem.scene.table import (
     problem,
     with_parameters,
 )
-from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_list, as_number, check_increasing
+from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_list, as_number, check_increasing, on_span
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
@@ -447,6 +447,6 @@ class OutputTable(SceneModel):
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)
             raise problem("output.stations", shown, f"are places along a beam; a {kind} has none")
-        outside = [x for x in self.positions(length) if not 0.0 <= x <= length]
+        outside = [x for x in self.positions(length) if not on_span(x, length)]
         if outside:
             raise problem("output.stations", outside[0], f"must be from 0 to the length {length:g} m")

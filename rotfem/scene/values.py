@@ -274,6 +274,11 @@ def evaluate(value: Any, x: npt.ArrayLike) -> Array:
     return np.asarray(values.reshape((*positions.shape, *entries.shape[1:])))
 
 
+def on_span(x: float, length: float | None) -> bool:
+    """Return whether x (m) is from 0 to the length of a structure, but for round-off; True if that is not known."""
+    return length is None or -ROUND_OFF <= x / length <= 1 + ROUND_OFF
+
+
 def check_profile_length(key: str, profile: Profile, length: float, slack: float = ROUND_OFF) -> None:
     """Refuse a taper that does not end at the length (m), to a relative slack; the problem is at `key`."""
     if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=slack):

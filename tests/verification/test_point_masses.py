@@ -93,3 +93,15 @@ def test_masses_that_are_refused(body: dict[str, Any], words: str) -> None:
     with pytest.raises(rotfem.SceneError, match=r"structure.masses.0") as caught:
         rotfem.Scene.from_dict({"structure": {**PLANAR, "masses": [body]}, "motion": STILL})
     assert words in str(caught.value)
+
+
+def test_places_are_at_the_tip_but_for_round_off() -> None:
+    """As 0.1 + 0.2 is 0.3: stations of a beam, and a mass of a plate, which has its moment about the root."""
+    near = L * (1 + 1e-12)
+    beam = {"structure": PLANAR, "motion": STILL, "loads": {"tip_force": [0.0, 2.0]}, "model": {"theory": "linear"}}
+    stations = rotfem.run({**beam, "output": {"stations": [0.0, near], "error": False}}).stations
+    assert stations is not None
+    np.testing.assert_allclose(stations["Q"], 2.0, rtol=1e-7)
+    plate = {"type": "plate", "length": L, "width": 1.0, "thickness": 0.1, "E": 7e10, "nu": 0.3, "rho": 1.0}
+    there = rotfem.check({"structure": {**plate, "point_masses": [[near, 0.5, 3.0]]}, "motion": STILL})
+    assert there.summary["mass"] == pytest.approx(0.1 * L + 3.0)

@@ -172,6 +172,15 @@ def test_without_damping_it_is_said():
     assert any("no damping" in line for line in warned.warnings)
 
 
+def test_damping_of_one_mode_leaves_hardly_any_in_others():
+    """By Coriolis forces: of ratios below 1e-6 and none. No frequency is that of a mode without damping."""
+    found = response(scene(structure={**STRUCTURE, "damping": {"modal": [1e-6, 1e-7, 0.0]}}, modes={"count": 6}))
+    undamped = [m["frequency"] for m in found.summary["modes"] if abs(m["damping"]) < 1e-8]
+    assert undamped
+    assert min(np.abs(found.frequencies / omega - 1.0).min() for omega in undamped) > 1e-5
+    assert found.rows[0]["difference"] < 1e-10
+
+
 def test_an_accuracy_is_said_not_to_be_pursued():
     tables = scene(structure=STRUCTURE)
     for key, value in (("accuracy", 1e-3), ("model", {"theory": "consistent_linear", "tolerance": 1e-2})):
