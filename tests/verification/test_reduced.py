@@ -166,6 +166,20 @@ def test_a_small_motion_beside_one_of_much_energy() -> None:
     assert "reduced" in both.summary
 
 
+def test_a_hinge_that_nothing_holds(spin_up: MakeScene) -> None:
+    """On the axis a swing has a double eigenvalue of zero, with spin or without: the tip is where esdirk4 leads it."""
+    hinge, time = (
+        {"structure.root": {"lag_stiffness": 0.0}, "model.theory": "consistent_linear"},
+        {"end": 1.0, "step": 0.05},
+    )
+    for speed in (0.0, 3.0):
+        motion = {"type": "constant", "speed": speed}
+        scene = spin_up(hinge, motion=motion, mesh={"elements": 2}, loads={"tip_force": GUST}, time=time)
+        reduced = run(scene.replace({"model.reduced": 1e-5}))
+        full = run(scene.replace({"time.step": 2e-3, "time.scheme": "esdirk4", "time.output_every": 25}))
+        assert difference(reduced.history, full.history, "tip_u2") < 3e-5
+
+
 def extrapolated(scene: Scene) -> dict[str, Array]:
     """Return the history of the full march, extrapolated from its step and half of it (second order)."""
     plain = {"model.reduced": None, "output.error": False}

@@ -263,11 +263,7 @@ class FreeHubEquations(HeldEquations):
         return rigid_turn(self.bordered, t)
 
     def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Return M, C, K (m + 1, m + 1) at a time (s), angle and speed, coupled as at rest; a spring holds the angle.
-
-        The spring, of one radian a second, is taken off again by the iteration: without it the modes of a rigid turn
-        would be dependent.
-        """
+        """Return M, C, K (m + 1, m + 1) at a time (s), angle and speed, coupled as at rest."""
         m, turn = self.model.size, np.array([[y[-1], v[-1], 0.0]])
         there = np.array([t])
         rates = turn + np.array([[0.0, 0.0, 1.0]])
@@ -275,7 +271,7 @@ class FreeHubEquations(HeldEquations):
         small, (f, pushed) = self.model.operators(factors[0]), (self.model.load(c) for c in factors)
         inertia = self.hub.inertia + self._inertia
         M, C, K = (np.zeros((m + 1, m + 1)) for _ in range(3))
-        for whole, own, corner in zip((M, C, K), small, (inertia, self.hub.damping, inertia), strict=True):
+        for whole, own, corner in zip((M, C, K), small, (inertia, self.hub.damping, 0.0), strict=True):
             whole[:m, :m], whole[m, m] = own[0], corner
         M[:m, m], M[m, :m] = (pushed - f)[0], self._slope
         return M, C, K

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.equations.pieces import PRESTRESS
-from rotfem.numerics.linear import MIDDLE, DirectSolver, combine, symmetric
+from rotfem.numerics.linear import MIDDLE, DirectSolver, combine, restrained, symmetric
 from rotfem.numerics.projection import orthonormal, summed, times, with_ghosts
 
 Array = npt.NDArray[np.float64]
@@ -140,15 +140,17 @@ class ReducedModel:
         return np.asarray(out)
 
     def stiffness(self, c: Array) -> DirectSolver:
-        """Return a solver with the stiffness of the full system, from the factors of all pieces (pieces,)."""
+        """Return a solver with the full stiffness, hinges held, from the factors of all pieces (pieces,)."""
         pieces = self.system.pieces
         there = [i for i in self.kinds["K"] if c[i] != 0.0]
         strains = [i for i, p in enumerate(pieces) if p.kind == "K" and "internal" in p.of and PRESTRESS not in p.of]
-        if there == strains and np.all(c[there] == 1.0) and not self.system.structure.hinges:
+        if there == strains and np.all(c[there] == 1.0):
             solver: DirectSolver = self.system.material_solver
             return solver
         A = self.system.A.duplicate()
         combine(A, [pieces[i].operator for i in there], c[there])
+        if self.system.structure.released:
+            restrained(A, self.system.structure.hinged_unknowns())
         return DirectSolver(A, symmetric=A.getSize()[0] > MIDDLE and symmetric(A))
 
     def solve(self, solver: DirectSolver, right: Array) -> Array:

@@ -16,7 +16,8 @@ found by
 
 for all nodes of a window of steps at once, Picard's iteration. It converges the quicker the shorter the window and the
 nearer the reference, which is that of the middle of the window (section 2.2 there). With constant matrices and no
-other terms in r its first iterate is the solution.
+other terms in r its first iterate is the solution, unless a mode turns by less than a radian in the window. The two
+eigenvectors of a double λ = 0, as of a hinge without a spring or a free hub, are one: the reference is stiffer there.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ class Modes:
 
     Args:
         M, C, K: its matrices, (m, m).
+        span: length of the window, s. Undamped modes slower than a radian in it get the stiffness of that.
 
     Raises:
         ComputationError: M is not positive definite, or a matrix not finite.
@@ -59,7 +61,7 @@ class Modes:
         into: its inverse.
     """
 
-    def __init__(self, M: Array, C: Array, K: Array):
+    def __init__(self, M: Array, C: Array, K: Array, span: float):
         m = len(M)
         self.M = M + 1e-14 * np.abs(np.diag(M)).max() * np.eye(m)  # of a mass that is round-off of the projection
         # in undamped modes S, and in units in which rates are as large as coordinates
@@ -67,8 +69,10 @@ class Modes:
             squares, S = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (self.M + self.M.T))
         except (np.linalg.LinAlgError, ValueError) as error:
             raise ComputationError("the masses of the reduced model are not positive, or not finite") from error
-        w = np.sqrt(np.maximum(np.abs(squares), np.finfo(float).eps * np.abs(squares).max()))
+        least = max(span**-2, np.finfo(float).eps * np.abs(squares).max())
+        w = np.sqrt(np.maximum(np.abs(squares), least))
         stiff, damped = (np.linalg.solve(S, np.linalg.solve(self.M, A @ S)) for A in (K, C))
+        stiff += np.diag(np.where(np.abs(squares) < least, least - squares, 0.0))
         for part in (1.0, 0.9):  # less damping where eigenvectors are so dependent that half the digits are lost
             A = np.block([[np.zeros((m, m)), np.diag(w)], [-stiff / w, -part * damped]])
             self.values, vectors = np.linalg.eig(A)
@@ -114,7 +118,8 @@ class Window:
     def __init__(self, equations: Any, ends: Array, x: Array):
         m, h = len(x) // 2, np.diff(ends)
         self.ends, self._powers = ends, h[:, None] ** -np.arange(len(NODES))
-        self._modes = modes = Modes(*equations.reference(0.5 * float(ends[0] + ends[-1]), x[:m], x[m:]))
+        M, C, K = equations.reference(0.5 * float(ends[0] + ends[-1]), x[:m], x[m:])
+        self._modes = modes = Modes(M, C, K, float(ends[-1] - ends[0]))
         residual = equations.at(equations.within(ends[:-1], ends[1:], NODES).ravel())
         weights = [modes.weights(share * h) for share in NODES]
         self._g: Array = np.zeros((len(h), len(NODES), m))
