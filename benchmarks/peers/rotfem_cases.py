@@ -9,8 +9,7 @@ from typing import Any
 
 import rotfem
 from rotfem.analysis.march import March, Steps
-from rotfem.commands.moment import first_shape
-from rotfem.commands.problem import Problem
+from rotfem.commands.problem import Problem, first_shape
 from rotfem.numerics.newton import Newton
 from rotfem.registry import schemes
 

@@ -20,9 +20,9 @@ from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
-from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
+from rotfem.commands.recorder import check_rows
 from rotfem.errors import SceneError
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work

@@ -17,8 +17,7 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
 from rotfem.analysis.theory_error import RESOLVED, TheoryError, static_rotation
 from rotfem.commands.first_state import Start
-from rotfem.commands.monitor import Monitor
-from rotfem.commands.recorder import accuracy_of
+from rotfem.commands.recorder import Monitor, accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem

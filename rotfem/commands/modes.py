@@ -23,9 +23,9 @@ from rotfem.commands.advice import advise
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
-from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, modal_summary
+from rotfem.commands.recorder import check_rows
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work

@@ -29,10 +29,9 @@ from rotfem.commands.error_report import RunErrors, check_rotations, output_of
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.loads import frozen_inputs
-from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
-from rotfem.commands.recorder import Recorder, reduced_history
+from rotfem.commands.recorder import Log, Monitor, Recorder, reduced_history
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of

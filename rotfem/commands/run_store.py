@@ -23,8 +23,7 @@ from mpi4py import MPI
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
-from rotfem.commands.monitor import Log, Monitor
-from rotfem.commands.recorder import Recorder
+from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import OutputError, SceneError, Stopped
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.refine import Setting

@@ -21,8 +21,8 @@ from scipy.optimize import linear_sum_assignment
 
 from rotfem.errors import InputError
 from rotfem.results.columns import ShortTable, described, label, largest, number, per_cent
-from rotfem.results.files import read_csv, rows_text
-from rotfem.results.result import Result, Row, Rows, Variables, column_of_rows
+from rotfem.results.files import read_csv
+from rotfem.results.result import Result, Row, Rows
 from rotfem.results.result_set import read_summary
 
 if TYPE_CHECKING:
@@ -119,10 +119,6 @@ class CompareResult(Rows):
     compared: list[Compared]
     index = ("result", "quantity")
 
-    def texts(self) -> dict[str, str]:
-        """Return compare.csv."""
-        return {"compare.csv": rows_text(self.rows)}
-
     def drawn(self) -> dict[str, str]:
         """Return compare.png: the results over each other."""
         return {"compare.png": "results.compare:compare_figure"}
@@ -139,11 +135,6 @@ class CompareResult(Rows):
                 rows.append((f"{row['quantity']} ({row['unit']})", *values, per_cent(row["difference"]), last))
             out.append(ShortTable((f"{title}", self.summary["name"], "value", "difference (%)", of), rows))
         return out
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the columns of the rows over `row`."""
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: (("row",), column_of_rows(self.rows, name)) for name in names}, {}
 
 
 def compare(*results: Result | str | Path) -> CompareResult:

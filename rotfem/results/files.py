@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic_core import to_jsonable_python
 
 from rotfem.errors import OutputError
 
@@ -96,21 +97,8 @@ def read_csv(path: str | Path) -> dict[str, Array]:
 
 def json_text(data: Any) -> str:
     """Return data as JSON; numbers that JSON cannot hold (NaN, infinity) become null."""
-    return json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n"
-
-
-def _jsonable(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {str(key): _jsonable(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_jsonable(value) for value in data]
-    if isinstance(data, np.ndarray):
-        return _jsonable(data.tolist())
-    if isinstance(data, np.generic):
-        data = data.item()
-    if isinstance(data, float) and not np.isfinite(data):
-        return None
-    return data
+    plain = to_jsonable_python(data, inf_nan_mode="null", fallback=lambda value: value.tolist())
+    return json.dumps(plain, indent=2, allow_nan=False) + "\n"
 
 
 def write_text(path: Path, text: str) -> Path:

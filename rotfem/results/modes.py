@@ -142,17 +142,6 @@ class ModesResult(Rows):
         """Whether no mode grows."""
         return all(row["stability"] in ("stable", "neutral") for row in self.rows)
 
-    def column(self, name: str) -> Array:
-        """Return a number of every mode, shape (modes,): `frequency`, `residual`, `share_lag` and so on.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        there = [key for key, value in (self.rows[0] if self.rows else {}).items() if not isinstance(value, str)]
-        if name not in there:
-            raise KeyError(f"no number {name!r} of the modes; there are {', '.join(there)}")
-        return np.array([row[name] for row in self.rows], dtype=np.float64)
-
     def with_shapes(self) -> list[tuple[dict[str, Any], dict[str, Array], str]]:
         """Return row, shape, and frequency in the unit shown of every mode but that of a rigid body, the first one."""
         units, rows = ShownUnits.of(self.summary), self.rows[len(self.rows) - len(self.shapes) :]
@@ -316,7 +305,7 @@ class ResponseResult(Rows):
     @property
     def frequencies(self) -> Array:
         """Frequencies, rad/s, increasing."""
-        return np.array([row["frequency"] for row in self.rows])
+        return self.column("frequency")
 
     def amplitude(self, output: str) -> Array:
         """Return the amplitude of an output over the frequencies, in its unit."""

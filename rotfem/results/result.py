@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rotfem.errors import printable
 from rotfem.registry import resolved
 from rotfem.results.columns import ShortTable, described
-from rotfem.results.files import json_text, write_whole
+from rotfem.results.files import json_text, rows_text, write_whole
 
 if TYPE_CHECKING:
     import pandas
@@ -172,12 +172,34 @@ class Rows(Result):
 
     rows: list[Row]
 
-    #: Names that label the rows.
+    #: Names that label the rows, and the dimension that the labelled arrays have of them.
     index: ClassVar[tuple[str, ...]] = ()
+    dimension: ClassVar[str] = "row"
+
+    def column(self, name: str) -> Array:
+        """Return a number of every row, such as `frequency`, shape (rows,).
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        there = [key for key, value in (self.rows[0] if self.rows else {}).items() if not isinstance(value, str)]
+        if name not in there:
+            raise KeyError(f"no number {name!r} of the rows; there are {', '.join(there)}")
+        return np.array([row[name] for row in self.rows], dtype=np.float64)
 
     def flat_rows(self) -> list[Row]:
         """Return the rows as a table has them, with one value a name."""
         return self.rows
+
+    def texts(self) -> dict[str, str]:
+        """Return the rows as a CSV file that is called after the command."""
+        return {f"{self.summary['command']}.csv": rows_text(self.flat_rows())}
+
+    def arrays(self) -> tuple[Variables, Variables]:
+        """Return the columns over `dimension`, the number of the row from 0 on."""
+        rows = self.flat_rows()
+        names = dict.fromkeys(name for row in rows for name in row)
+        return {name: ((self.dimension,), column_of_rows(rows, name)) for name in names}, {}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the rows as a table, labelled by `index`; what a row does not have is NaN.

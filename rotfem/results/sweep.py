@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.columns import ZERO, ShortTable, label_of, numbers
-from rotfem.results.files import rows_text, writing
+from rotfem.results.files import writing
 from rotfem.results.result import Rows, Variables, column_of_rows
 
 if TYPE_CHECKING:
@@ -71,10 +71,6 @@ class SweepResult(Rows):
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
         return column_of_rows(self.rows, name).astype(np.float64).reshape(self._shape)
-
-    def texts(self) -> dict[str, str]:
-        """Return sweep.csv."""
-        return {"sweep.csv": rows_text(self.rows)}
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes sweep.nc, where xarray is installed."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from rotfem.commands.monitor import Monitor
+from rotfem.commands.recorder import Monitor
 from rotfem.results.files import read_csv
 from tests.beams import BEAM_TABLE
 from tests.cli.conftest import Done

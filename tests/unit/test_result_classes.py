@@ -221,7 +221,7 @@ def test_modes_by_their_names() -> None:
     np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
     assert result.stable
     assert not modes("dynamic instability").stable
-    with pytest.raises(KeyError, match="no number 'label' of the modes; there are mode, frequency"):
+    with pytest.raises(KeyError, match="no number 'label' of the rows; there are mode, frequency"):
         result.column("label")
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import tomli_w
 
 from rotfem.commands.accuracy import changes_of
@@ -17,8 +16,8 @@ from rotfem.errors import ComputationError, SceneError
 from rotfem.refinement.estimate import percent
 from rotfem.refinement.refine import Setting
 from rotfem.results.columns import ShortTable, per_cent
-from rotfem.results.files import json_text, rows_text, write_text
-from rotfem.results.result import Array, Row, Rows, Variables, column_of_rows
+from rotfem.results.files import json_text, write_text
+from rotfem.results.result import Array, Row, Rows
 from rotfem.scene import Scene
 
 if TYPE_CHECKING:
@@ -145,6 +144,7 @@ class CostResult(Rows):
 
     scene: Scene = field(repr=False)
     references: dict[str, Reference] = field(default_factory=dict, repr=False)
+    dimension = "setting"
 
     @property
     def front(self) -> list[Row]:
@@ -229,20 +229,12 @@ class CostResult(Rows):
     def texts(self) -> dict[str, str]:
         """Return cost.csv and cost.json."""
         keys = ("output", "references", "model_errors", "recommended", "recommendations")
-        return {
-            "cost.csv": rows_text(self.flat_rows()),
-            "cost.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
-        }
+        found = {**{k: self.summary[k] for k in keys}, "rows": self.rows}
+        return {**super().texts(), "cost.json": json_text(found)}
 
     def drawn(self) -> dict[str, str]:
         """Return cost.png."""
         return {"cost.png": "commands.cost.result:cost_figure"}
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the columns of cost.csv over `setting`, the number of the row from 0 on."""
-        over, rows = ("setting",), self.flat_rows()
-        coordinates: Variables = {"setting": (over, np.arange(len(rows)))}
-        return {name: (over, column_of_rows(rows, name)) for name in rows[0]}, coordinates
 
 
 def _cost(row: Row) -> str:

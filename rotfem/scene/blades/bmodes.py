@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import coned_root, scaled_rows
-from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
+from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, coned_root, scaled_rows
 from rotfem.scene.values import Array
 
 COLUMNS = [

@@ -24,8 +24,7 @@ import numpy as np
 
 from rotfem.errors import show
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_HAWC2, line_of, rows_over, turned_matrix
-from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, find_file
+from rotfem.scene.blades.deck import FROM_HAWC2, Asked, BladeFormat, Deck, find_file, line_of, rows_over, turned_matrix
 from rotfem.scene.files import DEEPEST
 from rotfem.scene.section import about_reference, mass_matrices
 from rotfem.scene.table import problem

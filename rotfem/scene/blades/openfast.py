@@ -20,8 +20,11 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import (
+from rotfem.scene.blades.deck import (
     FROM_IEC,
+    Asked,
+    BladeFormat,
+    Deck,
     coned_root,
     iec_pretwist,
     line_of,
@@ -29,7 +32,6 @@ from rotfem.scene.blades.axes import (
     scaled_rows,
     turned_matrix,
 )
-from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
 from rotfem.scene.values import DIGITS, ROUND_OFF, Array, is_positive
 
 #: Columns of ElastoDyn's blade file that must be there.

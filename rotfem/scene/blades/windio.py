@@ -16,8 +16,18 @@ from typing import Any, NoReturn
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_IEC, coned_root, iec_pretwist, line_of, rows_over, scaled_rows, turned_matrix
-from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
+from rotfem.scene.blades.deck import (
+    FROM_IEC,
+    Asked,
+    BladeFormat,
+    Deck,
+    coned_root,
+    iec_pretwist,
+    line_of,
+    rows_over,
+    scaled_rows,
+    turned_matrix,
+)
 from rotfem.scene.values import DIGITS, UPPER, Array, is_positive, symmetric_matrices
 
 #: Key that later versions have, and those that are known.
