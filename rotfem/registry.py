@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
+from inspect import get_annotations
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 
@@ -41,9 +42,11 @@ class Registry(Generic[E]):
         """Add an entry.
 
         Raises:
+            TypeError: it is a class that lacks a method or an attribute, or whose parameters are no dataclass fields.
             ValueError: its name is taken, or no name.
         """
         self._load()
+        _check_class(entry)
         if not isinstance(entry.name, str) or not entry.name.isidentifier():
             raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
         if entry.name in self._entries:
@@ -80,6 +83,19 @@ class Registry(Generic[E]):
         return iter([self._entries[name] for name in self.names])
 
 
+def _check_class(entry: Any) -> None:
+    """Refuse a class with abstract methods, without the attributes of its kind, or with fields but no dataclass."""
+    if not isinstance(entry, type) or hasattr(entry, "model_fields"):  # pydantic checks the tables of a scene
+        return
+    declared = {name: hint for base in entry.__mro__ for name, hint in get_annotations(base).items()}
+    missing = [name for name, hint in declared.items() if "ClassVar" in str(hint) and not hasattr(entry, name)]
+    if absent := sorted({*missing, *getattr(entry, "__abstractmethods__", ())}):
+        raise TypeError(f"{entry.__name__} lacks {', '.join(absent)}")
+    fields = any("ClassVar" not in str(hint) for hint in get_annotations(entry).values())
+    if fields and "__dataclass_fields__" not in vars(entry):
+        raise TypeError(f"{entry.__name__} must be a dataclass: its fields are its parameters")
+
+
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
 theories: Registry[Any] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Any] = Registry("effect", "rotfem.mechanics.effects")
@@ -108,7 +124,7 @@ def register(entry: Entry | type[Entry]) -> None:
             `Scheme` or `MotionLaw`.
 
     Raises:
-        TypeError: it is none of these.
+        TypeError: it is none of these, or a class that is not complete.
         ValueError: its name is taken, or no name.
     """
     registry = getattr(entry, "registry", None)

@@ -103,6 +103,12 @@ class Session:
         if isinstance(error, KeyboardInterrupt):
             message = f"interrupted{self._kept() or '; there are no results yet'}"
             self._end(message, 130, alone=not together(self.comm, error))
+        from rotfem.scene.extensions import failure
+
+        if isinstance(error, Exception) and (message := failure(error)):
+            if not self.first:
+                sleep(1.0)  # rank 0 speaks before mpirun ends it
+            self._end(message, 2, alone=self.comm.size > 1)
         if self.comm.size > 1 and not isinstance(error, SystemExit):
             # A rank that fails alone would leave the others waiting for it.
             import traceback

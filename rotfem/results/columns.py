@@ -108,7 +108,7 @@ def described(column: str) -> tuple[str, str]:
         return f"{what} at {place} m", unit
     if column in COLUMNS:
         return COLUMNS[column]
-    if column.startswith("tip_"):
+    if column.startswith("tip_") and column[4:].rstrip("123") in ("u", "alpha", "theta"):
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
     if column.startswith("shape_"):

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import PlainValidator
 
 from rotfem import registry
-from rotfem.errors import SceneError
+from rotfem.errors import SceneError, shown
 from rotfem.scene.files import LARGEST, Unreadable, read_bytes
 from rotfem.scene.table import SceneModel, problem
 
@@ -79,6 +79,21 @@ def load(name: str, path: Path, file: str, key: str) -> None:
 def loaded() -> tuple[Path, ...]:
     """Return the files that have been run."""
     return tuple(_LOADED)
+
+
+def failure(error: Exception) -> str:
+    """Return the message of an unexpected error where files have been loaded, "" where none has.
+
+    Of an error that passes through a file it names the line. Of any other, as a wrong number of arguments, the
+    files are only where the fault may be.
+    """
+    for path in _LOADED:
+        if any(frame.filename == str(path) for frame in traceback.extract_tb(error.__traceback__)):
+            return f"{shown(path)}: {_described(error, path)}"
+    files = ", ".join(str(shown(path)) for path in sorted(_LOADED))
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    what = f"what {files} registers may not fit: {type(error).__name__}: {error} ({where.name})"
+    return f"{what}; --debug shows the calls" if files else ""
 
 
 def _described(error: BaseException, path: Path) -> str:

@@ -11,6 +11,7 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import partial
 from typing import Annotated, Any, ClassVar, TypeAlias
 
@@ -150,6 +151,9 @@ class Section(SceneModel):
             dimensions = self._dimensions(np.array(self.knots))
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
+            for name, values in asdict(self._geometry(np.array(self.knots))).items():
+                if name not in ("centroid", "shear_center") and not np.all(np.greater(values, 0.0)):
+                    raise problem("shape", self.shape, f"gives {name} = {np.min(values):g}; must be above 0")
 
 
 def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:

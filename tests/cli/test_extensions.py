@@ -249,3 +249,43 @@ def test_files_that_fail(rotfem: Rotfem, folder: Path, by: str, content: str | N
     assert done.err.count("\n") == 1
     assert not (folder / "out").exists()
     assert "half" not in registry.effects
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("lambda m, delta: m.velocty(delta)", "mine.py: line 2: AttributeError: 'Mechanics' object has no attribute"),
+        ("lambda m: 0", "what mine.py registers may not fit: TypeError: <lambda>() takes 1 positional argument but 2"),
+    ],
+)
+def test_what_is_registered_fails_later(rotfem: Rotfem, folder: Path, content: str, message: str) -> None:
+    """One line as well, which names the file, and its line where the error is there."""
+    (folder / "mine.py").write_text(f"import rotfem\nrotfem.register(rotfem.Effect('half', {content}))\n")
+    done = rotfem("--load", "mine.py", "run", "beam.toml", "-o", "out")
+    assert done.status == 2
+    assert done.err.startswith(f"rotfem: {message}")
+    assert done.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("class M(rotfem.MotionLaw):\n name = 'm'\n mean: float\n speed = float", "M must be a dataclass"),
+        ("class M(rotfem.MotionLaw):\n name = 'm'", "M lacks speed"),
+        ("class S(rotfem.Scheme):\n name = 'm'\n stage = finish = None", "S lacks order"),
+    ],
+)
+def test_classes_that_are_not_complete(rotfem: Rotfem, folder: Path, content: str, message: str) -> None:
+    (folder / "mine.py").write_text(f"import rotfem\n{content}\nrotfem.register({content[6]})\n")
+    done = rotfem("--load", "mine.py", "check", "beam.toml", "-o", "out")
+    assert (done.status, message in done.err) == (2, True)
+
+
+def test_shape_with_a_negative_property(rotfem: Rotfem, folder: Path) -> None:
+    shape = "rotfem.Shape('bad', ('side',), lambda nu, side: rotfem.Geometry(side**2, -side, side, side, side))"
+    (folder / "mine.py").write_text(f"import rotfem\nrotfem.register({shape})\n")
+    section = "structure.section={E=7e10, nu=0.3, rho=2700, shape='bad', side=0.1}"
+    done = rotfem("--load", "mine.py", "check", "beam.toml", "--set", section, "-o", "out")
+    assert done.status == 2
+    assert "structure.section.shape" in done.err
+    assert "second_moment2 = -0.1; must be above 0" in done.err
