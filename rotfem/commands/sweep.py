@@ -65,15 +65,17 @@ def values_of(text: str) -> list[Any]:
         first, last, number, unit = found.groups()
         try:
             values = [float(f"{value:.12g}") for value in np.linspace(float(first), float(last), int(number))]
-        except ValueError:
+            whole = "." not in first + last and all(value == round(value) for value in values)
+        except (ValueError, OverflowError):
             raise InputError("sweep --set", text, "must be first:last:number, of numbers") from None
-        whole = "." not in first + last and all(value == round(value) for value in values)
         numbers = list(map(round, values)) if whole else values
         return [f"{value!r} {unit}" for value in numbers] if unit else list(numbers)
     with suppress(ValueError):
         tomllib.loads(f"value = {text}")
         return [text]
     parts = [part.strip() for part in text.split(",")]
+    if any(part.count(a) != part.count(b) for part in parts for a, b in ("[]", "{}")):
+        raise InputError("sweep --set", text, "must be values without commas within, which stand between them")
     if (last_one := WITH_UNIT.fullmatch(parts[-1])) and not any(map(WITH_UNIT.fullmatch, parts[:-1])):
         parts = [f"{part} {last_one[2]}" for part in [*parts[:-1], last_one[1]]]
     return [_number(part) for part in parts]

@@ -156,12 +156,14 @@ def compare(*results: Result | str | Path) -> CompareResult:
             allowed = f"must be of {reference.command}, as {reference.title} is"
             raise InputError("compare", f"{other.title}: {other.command}", allowed)
         pairs = _pairs(reference.curves, other.curves, by_name=reference.command != "campbell")
-        found = [*(_modes(reference, other) if reference.command == "modes" else _distances(pairs))]
+        found, alone = [*_distances(pairs)], list[str]()
+        if reference.command == "modes":
+            found, alone = _modes(reference, other)
         if reference.command == "campbell":
             found += _critical(reference, other, {(a.name, b.name) for a, b in pairs})
         rows += [{"result": other.title, **row} for row in found]
         names = [{curve.name for curve in curves} for curves in zip(*pairs, strict=True)] or [set(), set()]
-        alone = sorted({*reference.curves} - names[0] | {*other.curves} - names[1])
+        alone += sorted({*reference.curves} - names[0] | {*other.curves} - names[1])
         if alone:
             warnings.append(f"{other.title} and {reference.title}: only one of them has {', '.join(alone)}")
     summary = {
@@ -213,9 +215,14 @@ def _distances(pairs: list[tuple[Curve, Curve]]) -> Iterator[Row]:
         }
 
 
-def _modes(a: Compared, b: Compared) -> Iterator[Row]:
-    """Yield a row for each pair of modes: of like shapes, and among those of like frequencies."""
-    ones, others = a.modes, b.modes
+def _modes(a: Compared, b: Compared) -> tuple[list[Row], list[str]]:
+    """Return a row for each pair of modes, and the names of those without a partner.
+
+    Pairs are of like shapes, and among those of like frequencies. A rigid-body mode, which has no shape, is none of
+    them with another mode.
+    """
+    ones, others, rows = a.modes, b.modes, list[Row]()
+    alone = [[mode["label"] for mode in modes] for modes in (ones, others)]
     mac, far = np.zeros((len(ones), len(others))), np.zeros((len(ones), len(others)))
     for i, j in np.ndindex(far.shape):
         u, v = a.shapes[i], b.shapes[j]
@@ -226,10 +233,16 @@ def _modes(a: Compared, b: Compared) -> Iterator[Row]:
             mac[i, j] = _relative(float(np.abs(np.vdot(x, y)) ** 2), float(np.vdot(x, x).real * np.vdot(y, y).real))
         here = ones[i]["frequency"]
         far[i, j] = _relative(abs(others[j]["frequency"] - here), here)
-    for i, j in zip(*linear_sum_assignment(np.minimum(far, 1.0) - mac), strict=True):
+    apart = np.not_equal.outer([bool(u) for u in a.shapes], [bool(v) for v in b.shapes])
+    for i, j in zip(*linear_sum_assignment(np.minimum(far, 1.0) - mac + 2 * apart), strict=True):
+        if apart[i, j]:
+            continue
         frequencies = {"reference": ones[i]["frequency"], "value": others[j]["frequency"]}
         differences = {"difference": float(far[i, j]), "mac": float(mac[i, j])}
-        yield {"quantity": ones[i]["label"], "unit": "rad/s", **frequencies, **differences}
+        rows.append({"quantity": ones[i]["label"], "unit": "rad/s", **frequencies, **differences})
+        alone[0].remove(ones[i]["label"])
+        alone[1].remove(others[j]["label"])
+    return rows, [*alone[0], *alone[1]]
 
 
 def _critical(a: Compared, b: Compared, branches: set[tuple[str, str]]) -> Iterator[Row]:

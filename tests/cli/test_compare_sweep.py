@@ -136,6 +136,8 @@ def test_sweep_writes_a_table_arrays_and_a_figure(folder: Path, rotfem: Rotfem) 
         (("--set", "motion.speed=1,2", "--", "modes", "--nonsense"), "No such option"),
         (("--set", "motion.speed=1", "--", "modes"), "must give a key several values"),
         (("--set", "motion.speed=1:b:3", "--", "modes"), "must be first:last:number"),
+        (("--set", "motion.speed=nan:1:3", "--", "modes"), "must be first:last:number"),
+        (("--set", "loads.tip_force=[0,1],[0,2]", "--", "run"), "without commas"),
         (("--set", "motion.sped=1,2", "--", "modes"), "motion.sped"),
         (("--set", "motion.speed=1,2", "-j", "0", "--", "modes"), "must be at least 1"),
     ],

@@ -122,6 +122,19 @@ def test_what_only_one_has_is_said() -> None:
     assert result.warnings == ["b and a: only one of them has torque"]
 
 
+def test_a_rigid_body_has_no_partner_of_another_kind() -> None:
+    """The hub of one result is free; the first modes are as many as those of the other."""
+    free, held = modes("a", (0, 1, 2)), modes("b", (1, 2, 3))
+    free.rows[0]["label"] = "rigid body"
+    free.shapes.pop("mode 1")
+    for pair in ((free, held), (held, free)):
+        result = compare(*pair)
+        assert [row["quantity"] for row in result.rows] == ["lag 1", "lag 2"]
+        assert result.summary["worst"] == 0.0
+        (said,) = result.warnings
+        assert said.endswith(("rigid body, lag 3", "lag 3, rigid body"))
+
+
 def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
     a = history("a", 5, 1.0)
     with pytest.raises(InputError, match="two results at least"):
