@@ -39,7 +39,7 @@ CAPABILITIES = {
         analysis.turning mechanics.courses
     """,
     "loads": """
-        commands.loads mechanics.loads scene.load structures.applied_loads
+        mechanics.loads scene.load structures.applied_loads
         structures.plate_loads
     """,
     "modes and other analyses": "analysis",

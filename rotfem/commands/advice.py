@@ -1,4 +1,4 @@
-"""Hints at the start of a computation: what will disappoint and no warning can say afterwards."""
+"""Hints at the start of a computation, and warnings of inputs over time that it takes as at t = 0."""
 
 from __future__ import annotations
 
@@ -75,3 +75,22 @@ def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
         return []
     what = "speed and loads are constant, and the history starts in balance: nothing will move"
     return [f'{what}; initial.state = "undeformed" lets them act all at once at t = 0']
+
+
+def frozen_inputs(problem: Problem) -> list[str]:
+    """Return warnings where what is computed at one time, as modes are, has motion, gravity and loads as at t = 0."""
+    given = {name: load.unpitched or load for name, load in problem.loads.named.items()}
+    names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
+    said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
+    return [*frozen_in_frame(problem), *(said if names else [])]
+
+
+def frozen_in_frame(problem: Problem) -> list[str]:
+    """Return the same of pitch, gravity and base acceleration."""
+    motion = problem.motion
+    found = {
+        "structure.root.pitch changes with time": motion.pitch is not None,
+        "loads.gravity turns in the rotating frame": problem.gravity_turns,
+        "motion.base_acceleration changes with time": motion.is_accelerated and motion.base_knots != (),
+    }
+    return [f"{what}: taken as at t = 0" for what, there in found.items() if there]

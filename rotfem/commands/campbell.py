@@ -16,8 +16,8 @@ from mpi4py import MPI
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import in_basis
+from rotfem.commands.advice import frozen_inputs
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
 from rotfem.commands.problem import Problem

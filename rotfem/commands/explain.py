@@ -14,8 +14,8 @@ from mpi4py import MPI
 
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import Steps
+from rotfem.commands.advice import frozen_inputs
 from rotfem.commands.first_state import first_state
-from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary

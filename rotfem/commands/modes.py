@@ -19,9 +19,8 @@ from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryError, error_under_load
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.advice import advise
+from rotfem.commands.advice import advise, frozen_inputs
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, modal_summary

@@ -18,12 +18,12 @@ from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.stability import Stability, stability_of
-from rotfem.commands.loads import load_of, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
+from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
@@ -33,7 +33,7 @@ from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.scene.settings import estimates_error
 from rotfem.units import si
-from rotfem.users_functions import number_of
+from rotfem.users_functions import checked, number_of
 
 
 class Moment:
@@ -383,3 +383,64 @@ def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
 
 def _sum(parts: list[Scalar]) -> Scalar:
     return lambda t: sum(part(t) for part in parts)
+
+
+def loads_of(scene: Scene, motion: Motion) -> Loads:
+    """Return the loads of a scene, under a motion that says how its hub turns."""
+    given, structure = scene.loads, scene.structure
+    points = []
+    for i, point in enumerate(given.at):
+        made = {
+            name: load_of(f"loads.at.{i}.{name}", load, structure, motion, point.kind_of(load))
+            for name, load in (("force", point.force), ("moment", point.moment))
+            if load is not None
+        }
+        points.append(PointLoads(point.x, **made))
+    whole: dict[str, Any] = {name: load for name in WHOLE if (load := getattr(given, name)) is not None}
+    made = {name: load_of(f"loads.{name}", load, structure, motion, load.kind) for name, load in whole.items()}
+    return Loads(gravity=given.gravity, at=tuple(points), **made)
+
+
+def load_of(key: str, given: Any, structure: Any, motion: Motion | None = None, kind: str = "dead") -> AnyLoad:
+    """Return one load, or another signal.
+
+    Args:
+        key: of the scene.
+        given: what the scene has there.
+        structure: of the scene.
+        motion: of the hub, which harmonics of its angle need.
+        kind: "dead" or "follower".
+    """
+    planar = structure.is_planar
+    size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
+    over, value = given.over
+    if "x" in over and callable(value):
+        timed = "t" in over
+        function = checked(value, key, size, "place and time" if timed else "place", planar)
+        at = function if timed else (lambda x, t: function(x))
+        # Places along the structure, of a plate from a file one, that show how the load changes with time.
+        probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
+        places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
+        return PlaceLoad(kind, at, places, constant=not timed)
+    terms = [_harmonic(harmonic, motion) for harmonic in getattr(given, "harmonic", ())]
+    if callable(value):
+        of_time = checked(value, key, size, "time", planar)
+        each = Shapes.uniform(np.eye(size))
+        terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
+    elif over == ("t",):
+        terms.append(Term.table(value, Shapes.uniform(np.eye(len(value[0]) - 1))))
+    elif over:
+        terms.append(Term(Shapes.along_span(value)) if over == ("x",) else Term.both(value))
+    elif isinstance(value, dict):
+        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in value.items()]
+    elif value is not None:
+        terms.append(Term(Shapes.uniform([value])))
+    return Load(kind, tuple(terms))
+
+
+def _harmonic(harmonic: Any, motion: Any) -> Term:
+    amplitude, per_rev = harmonic.amplitude, harmonic.per_rev
+    shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
+    if per_rev is None:
+        return Term.harmonic(shapes, lambda t: harmonic.frequency * t, harmonic.phase)
+    return Term.harmonic(shapes, lambda t: per_rev * np.array([motion.angle(float(s)) for s in t]), harmonic.phase)

@@ -7,6 +7,7 @@ together, with their amplitudes and phases, at one frequency that is swept (see 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -28,12 +29,14 @@ from rotfem.analysis.frequency_response import (
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.loads import SWEPT, frozen_in_frame, swept_loads
+from rotfem.commands.advice import frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
-from rotfem.commands.problem import Problem
+from rotfem.commands.problem import Problem, loads_of
 from rotfem.commands.processes import modal_summary, shared_out
-from rotfem.errors import SceneError, input_of
+from rotfem.errors import InputError, SceneError, input_of
+from rotfem.mechanics.loads import AnyLoad, Loads, PlaceLoad, Term
+from rotfem.mechanics.motion import Motion
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult
 from rotfem.scene import Scene, as_scene
@@ -44,6 +47,9 @@ Array = npt.NDArray[Any]
 #: Change of the log of an amplitude that bends its curve visibly; least distance of frequencies added for it, in parts
 #: of the range; part of the largest amplitude of its unit below which one is too small to matter.
 BEND, NARROW, DEEP = 0.2, 2e-4, 1e-6
+
+#: Times at which swept loads are: 0 without their harmonics, 1 with the part in phase, 2 with that a quarter ahead.
+SWEPT = (0.0, 1.0, 2.0)
 
 
 def response(
@@ -302,3 +308,31 @@ def remarks(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: fl
         why = f"it differs by {100 * off:.2g} % or more at half of the frequencies; use a larger modes.count"
         out.append(f"{count} modes are too few for the response by modes: {why}")
     return out
+
+
+def swept_loads(scene: Scene, motion: Motion) -> Loads:
+    """Return the loads of a scene whose harmonic parts at the times SWEPT are 0, cos φ and sin φ times their amplitude.
+
+    So a load Re(f̂ e^{iωt}) of any frequency, f̂ = amplitude e^{iφ}, can be put together.
+
+    Raises:
+        InputError: there is no harmonic load, or one that changes with time in another way.
+    """
+    made = loads_of(scene, motion)
+    changing = {name: load for name, load in made.named.items() if not load.constant}
+    if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
+        why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
+        raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
+    swept: dict[str, AnyLoad] = {}
+    for name, load in changing.items():
+        if isinstance(load, PlaceLoad) or any(t.amplitudes is not None and t.phase is None for t in load.terms):
+            raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
+        swept[name] = replace(load, terms=tuple(map(_swept, load.terms)))
+    return made.replaced(swept)
+
+
+def _swept(term: Term) -> Term:
+    if term.phase is None:
+        return term
+    factors = np.array([0.0, np.cos(term.phase), np.sin(term.phase)])
+    return replace(term, amplitudes=lambda t: np.asarray(factors[np.searchsorted(SWEPT, t)][:, None]))

@@ -24,11 +24,10 @@ from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.advice import advise, hints_of_start
+from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
 from rotfem.commands.error_report import RunErrors, check_rotations, output_of
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
-from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder, reduced_history

@@ -15,8 +15,7 @@ import tomli_w
 from pydantic import ValidationError
 
 import rotfem
-from rotfem.commands.loads import loads_of
-from rotfem.commands.problem import motion_of
+from rotfem.commands.problem import loads_of, motion_of
 from rotfem.errors import ComputationError, Problem, SceneError
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
