@@ -46,7 +46,7 @@ def panels_over(x: str, number: int, title: str) -> tuple[Figure, list[Axes]]:
     columns = 1 if number <= 3 else 2 if number <= 12 else 3
     rows = -(-max(number, 1) // columns)
     figure = Figure(figsize=(max(5.0 * columns, 7.0), 1.75 * rows + 1.0), layout="constrained")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title, fontsize=10, wrap=True)
     panels = [figure.add_subplot(rows, columns, (i % rows) * columns + i // rows + 1) for i in range(number)]
     for i, panel in enumerate(panels):
         lowest = i % rows == rows - 1 or i == number - 1
@@ -195,7 +195,7 @@ def response_figure(result: ResponseResult) -> Figure:
     for name in shown:
         rows.setdefault((name.partition("_")[0], described(name)[1]), []).append(name)
     figure = Figure(figsize=(10.0, 2.1 * max(len(rows), 1) + 1.2), layout="constrained")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title, fontsize=10, wrap=True)
     if not rows:
         return figure
     panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
@@ -235,7 +235,7 @@ def maps(number: int, mesh: Triangulation, title: str) -> tuple[Figure, list[Axe
     width = 10.0 / max(columns, 1)
     height = float(np.clip((0.72 if columns > 1 else 0.8) * width * aspect, 0.8, 6.0)) + 0.9  # titles, labels and bars
     figure = Figure(figsize=(10.0, rows * height + 0.6), layout="constrained")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title, fontsize=10, wrap=True)
     axes = [figure.add_subplot(rows, columns, i + 1) for i in range(number)]
     for i, axis in enumerate(axes):
         axis.set_aspect("equal")

@@ -85,7 +85,8 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         for i in np.flatnonzero(b.doubtful):
             axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
         if damped:
-            panels[1].plot(b.speed, b.damping, lw=1.4, **b.style)
+            there = np.isfinite(b.damping)
+            panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
     rays = [(f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
     for _, slope in rays:
         reach = top / slope

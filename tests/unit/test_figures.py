@@ -99,11 +99,14 @@ def test_what_is_marked_is_in_the_legend() -> None:
 
 
 def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
-    result = diagram({"1st forward whirl": 1.0})
+    """Its damping is that of the speeds that were solved, in one line."""
+    result = diagram({"1st forward whirl": 1.0}, 0.02)
     place = {"speed": 0.9, "kind": "forward", "order": 1, "per_rev": 0, "frequency": 0.0, "branch": 1}
     result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl", "name": "1st forward whirl"}]
-    lines = [line for line in campbell_figure(result).axes[0].get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
+    frequency, damping = campbell_figure(result).axes
+    lines = [line for line in frequency.get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
     assert np.min(lines[0].get_ydata()) == 0.0
+    assert any(np.array_equal(line.get_ydata(), 2.0 * np.ones(len(SPEEDS))) for line in damping.get_lines())
 
 
 def test_labels_are_spread_least() -> None:
@@ -160,6 +163,9 @@ def test_hub_and_root_are_drawn() -> None:
     for drawing in result.drawings():
         check(result.plot(drawing=drawing))
     assert len(result.plot(drawing="loads").axes) == 6
+    for name in names[:-1]:  # of which the line below the title is long
+        result.history[name] = 0.0 * T
+    check(result.plot(drawing="loads"))
 
 
 def test_a_steady_state() -> None:
