@@ -222,7 +222,7 @@ class Sweep:
         """Append a point, and points before it as long as the step is not sure."""
         last = self.points[-1]
         confidence = assign(last, target)
-        near = self._watched(last, target)
+        near = self._may_meet(last, target)
         if (confidence < SURE and near) or swapped(last, target, self.count):
             self.unresolved |= self.solves >= self.most_solves
             if target.speed - last.speed > 2 * self.finest and not self.unresolved:
@@ -236,7 +236,7 @@ class Sweep:
             ]
         self.points.append(target)
 
-    def _watched(self, last: SpeedPoint, target: SpeedPoint) -> bool:
+    def _may_meet(self, last: SpeedPoint, target: SpeedPoint) -> bool:
         """Return whether a branch that is asked for (not only a spare one) is unsure."""
         return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
 

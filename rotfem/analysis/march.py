@@ -49,7 +49,7 @@ class Steps:
 
 
 def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
-    """Yield the states at step, 2 step, … and end (s); the last distance may be shorter.
+    """Yield the states at step, 2 step, … and end (s); the last step may be shorter.
 
     Raises:
         ComputationError: a step failed, however short.
@@ -100,7 +100,7 @@ def turned_to(stepper: Stepper, state: State, old: State, leg: Leg, after: Leg) 
     return state
 
 
-#: A linear theory has lost its meaning when a displacement exceeds the structure's own length, or a rotation 1 rad.
+#: Displacement over the length, or rotation in rad, above which the result of a linear theory is refused.
 LARGEST_LINEAR_DEFLECTION = 1.0
 
 
@@ -146,15 +146,15 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Part of what is allowed that a step's error is led to: that of a vibration of allowed amplitude is allowed |cos φ|, ½
-#: in the geometric mean of its phases. Smallest change of a step.
+#: Error of a step that the controller aims at, as a part of the allowed one: a vibration's local error is its largest
+#: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps.
 AIM, SHRINK = 0.5, 0.2
 
 #: The longest step, and the intervals over which many knots are averaged, as parts of the end. A history is seldom
 #: drawn with more than 2000 points: what changes faster has the same impulse and first moment in every interval.
 LONGEST, CELL = 0.05, 5e-4
 
-#: Steps, with those taken back, after which a march is given up; steps over which its pace is measured.
+#: Steps, rejected ones included, after which a march is given up; steps over which its mean step is measured.
 MOST_STEPS, PACE = 500_000, 5000
 
 #: What to do then.
@@ -168,8 +168,8 @@ class AdaptiveSteps:
     """States whose local errors add up to a tolerance, relative to the largest displacement so far.
 
     The controller is H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what is allowed. It filters what
-    vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after one that was
-    taken back (Hairer, Nørsett & Wanner 1993, section II.4).
+    vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after a rejected
+    one (Hairer, Nørsett & Wanner 1993, section II.4).
 
     Steps land on the knots of what is prescribed. Where a cell of the time grid has more than a few of them, signals
     are straight lines over it.
@@ -204,7 +204,7 @@ class AdaptiveSteps:
         """
         state, wanted, stepper, before = self.state, self.wanted, self.stepper, self.before
         order, most = stepper.scheme.estimate[1] - 1, stepper.scheme.growth
-        switches, began = watched_switches(stepper.system), state.t
+        switches, began = switches_of(stepper.system), state.t
         self.largest = max(self.largest, self.measure.displacement(state))
         for number in range(1, MOST_STEPS + 1):
             if state.t >= self.end:
@@ -281,7 +281,7 @@ Filter = Callable[[Array], Array]
 
 
 class ErrorMeasure:
-    """What a step's local error makes of a history: the error at its end if every step were like this one.
+    """Error at the end of a history that a step's local error leads to if every step were like this one.
 
     A vibration of frequency ω and amplitude A has a local error e of C (ωh)ᵐ A in every step. N such steps add up to
     N C (ωh)ᵐ A, but never to more than 2 A, the vibration in opposite phase: what is small need not be resolved. A
@@ -289,17 +289,16 @@ class ErrorMeasure:
 
         B = 1/(1 + (τω)²ⁿ),    N C (h/τ)ᵐ = 2,    n = m/2, rounded up.
 
-    What is not resolved at all has an e of up to (s ωh)² A, of which the filter 1/(1 + (s ωh)²) leaves A, once: it is
-    damped, or hardly moved. The size of the error is the larger of both, taken twice for the half that B leaves. Stiff
-    axial motions, whose e is the largest there is, thus count with their amplitude.
+    An unresolved vibration has an e of up to (s ωh)² A, of which the filter 1/(1 + (s ωh)²) leaves A: it counts with
+    its amplitude. The error is the larger of both, times 2 for the half that B leaves.
 
     B is applied as n filters one after the other, for the n roots X of Xⁿ = −1:
 
         z (z M + τ C + τ²/z K)⁻¹ M e,    z² = −X,    Re z > 0.
 
     Matrices are those at the start. The angle of a free hub is among the unknowns, as the hub moves with vibrations.
-    With C motions that strong damping stops within the step are filtered too; without it their e, of h² a at the start,
-    would be taken for an error (as of any stiff component: Hairer & Wanner 1996, eq. (IV.8.20)).
+    With C, motions that strong damping stops within the step are filtered too (as any stiff component: Hairer & Wanner
+    1996, eq. (IV.8.20)).
 
     Args:
         system: equations of motion; state and time of the start are set in it.
@@ -345,7 +344,7 @@ class ErrorMeasure:
         return self.size(q)
 
     def _made(self, h: float) -> list[list[Filter]]:
-        """Return the filters of B, and that of what is not resolved, for steps of h (s)."""
+        """Return the filters of B, and that of unresolved vibrations, for steps of h (s)."""
         constant, order, lost = self.scheme.estimate
         n, tau = (order + 1) // 2, h * (0.5 * constant * self.end / h) ** (1 / order)
         B = [self._filter(np.exp(0.5j * np.pi * k / n), tau) for k in range(n - 1, -1, -2)]
@@ -367,8 +366,8 @@ class ErrorMeasure:
         return both
 
 
-#: Switches back in the very next step, and steps tried meanwhile, that are a sliding mode. A switch that the motion
-#: passes is not taken back at once: steps grow for tens of steps before there is another one to be found.
+#: Switches undone in the very next step, and steps meanwhile, that make a sliding mode. A switch that the motion passes
+#: is not undone at once.
 RETURNS, STEPS = 20, 2000
 
 #: What to do where there is one.
@@ -379,12 +378,11 @@ SMOOTHER = (
 
 
 class Switches:
-    """Counts the switches over the steps of a march of torques that jump with the motion: relays, as controllers are.
+    """Detects sliding modes of a torque that jumps with the motion, as a relay does, by counting switches over steps.
 
-    A switch that the motion passes once is found by the error of steps, which shorten up to it and grow again after it.
-    Where the torque drives the motion back from either side of its switch (a sliding mode, Filippov 1988, section 4),
-    no step passes it: the equations of an implicit step may have no solution there, and adaptive steps follow every
-    switch.
+    A single switch is resolved by the step-size control. Where the torque drives the motion back from either side of
+    its jump (a sliding mode, Filippov 1988, section 4) an implicit step may have no solution, and adaptive steps follow
+    every switch.
 
     Args:
         system: equations of motion of a free hub.
@@ -396,10 +394,10 @@ class Switches:
         self._switched = False
 
     def passed(self, number: int, old: State, new: State) -> None:
-        """Take note of a step.
+        """Count the switches of a step.
 
         Raises:
-            ComputationError: it is one of many that take the switch of the step before it back.
+            ComputationError: RETURNS steps have undone the switch of the step before.
         """
         before, self._switched = self._switched, self.between(self._seen(old), self._seen(new))
         if not (before and self._switched):
@@ -414,7 +412,7 @@ class Switches:
         )
         raise ComputationError(what, time=new.t, advice=SMOOTHER)
 
-    def ahead(self, state: State, h: float) -> bool:
+    def within(self, state: State, h: float) -> bool:
         """Return whether the torque jumps within a time h (s) of a state that goes on with its acceleration."""
         return self.between(self._seen(state), self._seen(state) + h * np.array([1.0, *self._rates(state)]))
 
@@ -450,6 +448,6 @@ class Switches:
         return [state.v[-1], state.a[-1], *np.zeros(len(self.system.structure.components))]
 
 
-def watched_switches(system: Any) -> Switches | None:
-    """Return what counts the switches of a free hub's torque that answers to the motion; None without one."""
+def switches_of(system: Any) -> Switches | None:
+    """Return the detector of sliding modes of a controlled torque of a free hub; None without one."""
     return Switches(system) if system.hub is not None and system.hub.torque.controlled else None

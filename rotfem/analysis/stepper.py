@@ -18,34 +18,34 @@ from rotfem.numerics.newton import REACH, Newton, OldFactor
 
 
 class BackOff:
-    """Attempts at something that pays where it works: after k failures in a row, up to 5, 2^k chances pass."""
+    """Exponential back-off: after k failures in a row, up to 5, the next 2^k − 1 chances are not used."""
 
     def __init__(self) -> None:
         self._failures = self._passing = 0
 
     def over(self) -> bool:
-        """Return whether it may be tried now; otherwise this chance has passed."""
+        """Return whether an attempt may be made now; otherwise count this chance as not used."""
         if self._passing == 0:
             return True
         self._passing -= 1
         return False
 
     def failed(self) -> None:
-        """Take note of a failure: the chance that it was counts as the first of those that pass."""
+        """Count a failure."""
         self._failures = min(self._failures + 1, 5)
         self._passing = 2**self._failures - 1
 
     def worked(self) -> None:
-        """Take note of a success."""
+        """Count a success."""
         self._failures = 0
 
 
 #: Iterations with an old factor after which the next step gets a new one.
 LONG = 8
 
-#: Newton iterations after which a way is long, and after which the prediction of the next step is questioned; its share
-#: that is taken for all.
-SOON, MANY, WHOLE = 6, 3, 0.9
+#: Newton iterations of a long solution, and of one after which the prediction of the next step may be shortened; part
+#: of a prediction above which it is not.
+SOON, MANY, RELIABLE = 6, 3, 0.9
 
 #: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
 #: where it stays at round-off.
@@ -53,11 +53,10 @@ REFINED, RATE, ROUND_OFF = 1e-11, 0.3, 1e-8
 
 
 def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
-    """Count rotations afresh if a step of h (s) might lead out of their range; return whether that was done.
+    """Count rotations from the present shape if a step of h (s) might leave their range; return whether that was done.
 
-    The motion that the state describes does not change, but the numbers for it do, in the state itself, so that whoever
-    holds it can go on with it. A memory of the scheme that is a second rate, as an auxiliary acceleration is, changes
-    as one; of any other the scheme makes a new one.
+    The state is changed in place: the same motion in new coordinates. A memory of the scheme that is a second rate, as
+    an auxiliary acceleration, is converted; any other is made anew by the scheme.
     """
     turns = system.structure.turns
     if turns is None:
@@ -79,7 +78,7 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
 
 @contextmanager
 def seen(system: Any, view: View) -> Iterator[None]:
-    """Let a system see what is prescribed as a view shows it."""
+    """Evaluate the signals of a system as a view says, within the context."""
     before = vars(system.view).copy()
     vars(system.view).update(vars(view))
     try:
@@ -101,9 +100,9 @@ class Stepper:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
         substituted: steps that the scheme could not take, by the name of the one that did.
         scheme_back_off: in the scheme, where others may stand in for it.
-        pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
-            far allow (s); None before the first.
-        observers: of every step that counts.
+        pace: memory of the step-size controller: length of the next step (s), largest displacement so far (scaled), and
+            error of the last step as a part of the allowed one; None before the first.
+        observers: called with (old state, new state, leg) after every accepted step.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
@@ -112,12 +111,12 @@ class Stepper:
         #: Matrices, and the stage that they are about.
         self._linearised: Any = None
         self._about: Stage | None = None
-        #: Whether Newton's way is a long one, so that tangents that know where it came from pay their compilation.
+        #: Whether solutions are long, so that tangents with the stresses of the last correction pay their compilation.
         self._far = False
         #: Whether a step was hard to solve, and whether the scheme keeps the balance of energy by itself.
         self._hard = self._balanced = False
-        #: Share of the last predicted move that came true.
-        self._share = 1.0
+        #: Part of a predicted move that is taken, by the last step.
+        self._reliable = 1.0
         self.back_off = BackOff()
         self.substeps = self.rejected = 0
         self.substituted: dict[str, int] = {}
@@ -210,7 +209,7 @@ class Stepper:
         return self.scheme.jumped(state.changed(a=state.a + change), change)
 
     def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
-        """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or feeds the motion.
+        """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or adds energy.
 
         Raises:
             ComputationError: Newton failed at the smallest step too; says how small it was.
@@ -226,9 +225,8 @@ class Stepper:
                 self.scheme_back_off.failed()
             else:
                 self.scheme_back_off.worked()
-                gains = halvings > 3 and self._gains_energy(
-                    new, state
-                )  # at last it is taken though it feeds the motion
+                # after two halvings a step is taken though it adds energy
+                gains = halvings > 3 and self._gains_energy(new, state)
                 if not gains:
                     return new
         if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
@@ -243,7 +241,7 @@ class Stepper:
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
 
     def _substituted(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
-        """Return the state at the end of a step that one of other schemes takes in two; None if none can."""
+        """Return the state at the end of a step that another scheme takes in two halves; None if none can."""
         for scheme in others:
             other = Stepper(self.system, scheme, self.newton)
             now, last = scheme.start(state), state.t + h if end is None else end
@@ -258,11 +256,10 @@ class Stepper:
         return None
 
     def _gains_energy(self, new: State, state: State) -> bool:
-        """Return whether a step that was hard to solve raises an energy that is above what there can be.
+        """Return whether a step that was hard to solve raises the energy of a system that nothing gives energy to.
 
-        Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's
-        method does not notice until the motion is lost; shorter steps give less, and take some back. Above what there
-        can be is 0.3 % of what is exchanged.
+        A scheme that does not resolve the motion may do so, a little in each step; shorter steps do it less. The rise
+        is allowed up to 0.3 % of the largest exchange between kinetic and strain energy.
         """
         s = self.system
         if not self._hard or self._balanced or s.linear or not s.model.closed:
@@ -286,7 +283,7 @@ class Stepper:
         return bool(too_much and now["jacobi"] > (first or energies(state))["jacobi"])
 
     def warnings(self) -> list[str]:
-        """Return what a run says of its steps."""
+        """Return the warnings of a run about halved and substituted steps."""
         out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
         for name, number in self.substituted.items():
             taken = f"{number} steps that {self.scheme.name} could not solve were taken by {name}"
@@ -296,7 +293,7 @@ class Stepper:
     # --- stages ------------------------------------------------------------------------------------------------------
 
     def predicted(self, stage: Stage, state: State) -> Array:
-        """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
+        """Return the predicted q of a stage; where the clamp moves the last shape, turned with it."""
         clamp, end = self.system.clamp, stage.t if stage.over is None else stage.over.end
         if clamp is None:
             return stage.q
@@ -312,7 +309,7 @@ class Stepper:
         return np.asarray(s.imbalance())
 
     def linearised(self, stage: Stage | None) -> Any:
-        """Return M, C and K about a stage, of None those of an earlier one if they still serve (see `Equations`)."""
+        """Return M, C and K at a stage; of None those of an earlier stage if they may be reused (see `Equations`)."""
         known = self._linearised
         if stage is None:
             return known if known is not None and known.serves and known.reference is self.system.reference else None
@@ -323,7 +320,7 @@ class Stepper:
 
     @property
     def matrices(self) -> dict[str, Any] | None:
-        """What makes the matrices at hand again: time, q, v, a and reference that they are about, and if they serve."""
+        """Data to assemble the current matrices again: t, q, v, a, reference, and whether they may be reused."""
         if self._about is None:
             return None
         known, about = self._linearised, self._about
@@ -331,18 +328,18 @@ class Stepper:
         return {**at, "reference": known.reference, "serves": known.serves}
 
     def make_matrices(self, known: dict[str, Any] | None) -> None:
-        """Make matrices again from what is known of them (see `matrices`); nothing from None."""
+        """Assemble matrices from their data (see `matrices`); do nothing of None."""
         if known is not None:
             self.system.count_rotations_from(known["reference"])
             self.linearised(Stage(known["t"], known["q"], known["v"], known["a"], 0.0, 0.0)).serves = known["serves"]
 
     def solve(self, stage: Stage, state: State) -> None:
-        """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
+        """Solve a stage of a step from a state, with an earlier factor if that converges."""
         factor, predicted = self._old_factor(stage), (stage.q.copy(), stage.v.copy(), stage.a.copy())
         if factor is not None and self.back_off.over():
             try:
                 self._iterate(stage, state, factor)
-            except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
+            except ComputationError:  # the old factor does not converge
                 self._factored = None
                 self.back_off.failed()
                 stage.begin_at(predicted)
@@ -352,26 +349,26 @@ class Stepper:
         if self.system.solved_at_once:
             self._iterate(stage, state)
             return
-        if self._share < WHOLE:
-            stage.correct((self._share - 1.0) * (stage.q - state.q))
+        if self._reliable < RELIABLE:
+            stage.correct((self._reliable - 1.0) * (stage.q - state.q))
         try:
             iterations = self._iterate(stage, state)
         except ComputationError:
-            if self._share == 0.0:
+            if self._reliable == 0.0:
                 raise
             stage.begin_at(predicted)
             stage.correct(state.q - stage.q)  # from where the step starts, whatever was predicted
-            self._share, self._far = 0.0, True
+            self._reliable, self._far = 0.0, True
             iterations = self._iterate(stage, state)
         self._hard |= self.newton.diverging or iterations > MANY
         self._balanced = stage.over is not None
-        if self._share < WHOLE or iterations > MANY:
-            self._share = came_true(self.system, stage.q - state.q, predicted[0] - state.q)
+        if self._reliable < RELIABLE or iterations > MANY:
+            self._reliable = reliable_part(self.system, stage.q - state.q, predicted[0] - state.q)
 
     def _old_factor(self, stage: Stage) -> OldFactor | None:
-        """Return who says for how long a factor serves; None where every iteration of a stage has one of its own.
+        """Return the control of an old factor; None where every iteration factorises its tangent.
 
-        A nonlinear stage may begin with a new one; a long way, and a balance of energy, need one in every iteration.
+        That is so of small systems, after long solutions, and where a balance of energy is kept.
         """
         s, held = self.system, self._factored == stage.shifts
         if not s.keeps_factor:
@@ -380,15 +377,15 @@ class Stepper:
             s.set_time(stage.t)
             if s.settled and not s.current:  # the matrix stays as it is from now on, and the factor is that of another
                 return None
-        if not held and (s.linear or stage.over is not None or self._far or self._share < WHOLE):
+        if not held and (s.linear or stage.over is not None or self._far or self._reliable < RELIABLE):
             return None
         return OldFactor(held)
 
     def _iterate(self, stage: Stage, state: State, factor: OldFactor | None = None) -> int:
-        """Solve a stage by Newton's method, with old factors as long as they serve if any do; return the iterations.
+        """Solve a stage by Newton's method, with an old factor if one is given; return the number of iterations.
 
         Raises:
-            ComputationError: it cannot be solved, or the root that was found is not the motion's.
+            ComputationError: it does not converge, or to a root that is not the motion's (see `check_root`).
         """
         span = None if self.system.linear else stage.over
         s, before = self.system if span is None else self.system.balance, state.q
@@ -450,7 +447,7 @@ class Stepper:
 
 
 def check_root(system: Any, stage: Stage, state: State) -> None:
-    """Refuse a root of a stage that is not the motion's.
+    """Refuse a root of a stage that is turned inside out, or has more energy than was there.
 
     Args:
         system: one that is solved by Newton's method, at the time of the stage.
@@ -458,7 +455,7 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
         state: where the step started.
 
     Raises:
-        ComputationError: it is turned inside out, or has energy that nothing has given it.
+        ComputationError: it is one of these.
     """
     system.set_state(stage.q, stage.v, stage.a)
     if not system.linear and system.model.inside_out():
@@ -474,11 +471,11 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
         raise ComputationError(what, time=stage.t)
 
 
-def came_true(system: Any, move: Array, predicted: Array) -> float:
-    """Return the share of a predicted move that makes it closest to the one that came, between 0 and 1.
+def reliable_part(system: Any, move: Array, predicted: Array) -> float:
+    """Return the part c of a predicted move p that is closest to the computed move m: m·p/p·p, cut to 0 … 1.
 
-    Where the motion is smooth it is 1. Where vibrations are faster than the steps resolve a prediction of constant
-    acceleration is worse than none: they are elsewhere after every step, and h²q̈ is much larger than they are.
+    It is 1 where the motion is smooth. Of vibrations that the steps do not resolve a prediction by constant
+    acceleration is worse than none, as h²q̈ is much larger than they are.
     """
     length = system.product(predicted, predicted)
     return float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
-from rotfem.analysis.march import SMOOTHER, March, Steps, watched_switches
+from rotfem.analysis.march import SMOOTHER, March, Steps, switches_of
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
@@ -263,8 +263,8 @@ class Simulation:
             return error
         if self.log.steps == 0:
             self.system.held.model.check_smooth()
-        switches, step = watched_switches(self.system), self.scene.time and self.scene.time.step
-        if switches is not None and step and self.last is not None and switches.ahead(self.last, step):
+        switches, step = switches_of(self.system), self.scene.time and self.scene.time.step
+        if switches is not None and step and self.last is not None and switches.within(self.last, step):
             what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)
         return error

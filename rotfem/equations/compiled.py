@@ -11,7 +11,7 @@ from rotfem.equations.bordered import BorderedSystem
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.time_signals import View, watched
+from rotfem.mechanics.time_signals import View, viewed
 from rotfem.structures.structure import check_memory
 
 
@@ -30,7 +30,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
         InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
     """
     view = View()
-    seen, signals = watched(problem, view) if moving else (problem, [])
+    seen, signals = viewed(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
     system: Any
     if problem.theory.linear and moving:  # its pieces are held apart, 12 kB for each unknown of a plate

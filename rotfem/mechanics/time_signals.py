@@ -111,7 +111,7 @@ class SeenTorque(Torque):
         return super().at(t, True) if after else self.seen(t)
 
 
-def watched(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
+def viewed(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
     """Return the problem whose signals are seen as a view shows them, and those that change with time."""
     signals: list[TimeSignal] = []
 
@@ -119,13 +119,13 @@ def watched(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
         signals.append(signal)
         return signal.seen(view)
 
-    motion = _watched_motion(problem.motion, see)
+    motion = _viewed_motion(problem.motion, see)
     changing = {name: load for name, load in problem.loads.named.items() if not load.constant}
-    seen = {name: _watched_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
+    seen = {name: _viewed_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
     return problem.replace(motion=motion, loads=problem.loads.replaced(seen)), signals
 
 
-def _watched_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:
+def _viewed_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:
     """Return a load as a view shows it; a function of place at every place, with the knots found at its probes."""
     signal = TimeSignal(name, load.at, _times(load.knots), many=load.many, known=load.linear)
     sampled = see(signal)
@@ -140,7 +140,7 @@ def _watched_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable
     return replace(load, function=at)
 
 
-def _watched_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Motion:
+def _viewed_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Motion:
     changes: dict[str, Any] = {}
     if motion.is_accelerated and not motion.constant:
         base, at = motion.base_knots, motion.base_acceleration
@@ -159,11 +159,11 @@ def _watched_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float]
             signal.continuous = name == "speed"
             changes[name] = see(signal)
     if motion.pitch is not None:
-        changes["pitch"] = _watched_pitch(motion.pitch, see)
+        changes["pitch"] = _viewed_pitch(motion.pitch, see)
     return replace(motion, **changes)
 
 
-def _watched_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Pitch:
+def _viewed_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Pitch:
     """Return a pitch as it is seen; neither the angle nor its rate may jump."""
     changes = dict[str, Any]()
     for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):

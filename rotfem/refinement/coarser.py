@@ -1,8 +1,8 @@
-"""The same problem on half the cells, or where these are fixed on finer ones.
+"""The same problem on half the cells; where nodes are fixed, on a finer mesh.
 
-Strains of elements of degree k converge with order k, displacements with k + 1 and frequencies with 2k where all is
-smooth (Strang & Fix 1973, sections 3.4 and 6.3). Of corners and thin layers at clamps that does not hold: the order
-counted on is that of strains, of linear elements that of displacements, 2.
+For smooth solutions strains of elements of degree k converge with order k, displacements with k + 1 and frequencies
+with 2k (Strang & Fix 1973, sections 3.4 and 6.3), but not at corners and in thin layers at clamps. The order assumed is
+max(2, k).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class OtherMesh:
     Attributes:
         system: of the problem there.
         ratio: of its cell sizes to the own ones; below 1 it is the finer of the two.
-        order: of convergence that is counted on.
+        order: of convergence that is assumed.
     """
 
     system: Any
@@ -47,7 +47,7 @@ class OtherMesh:
     order: int
 
     def error(self, difference: float) -> float:
-        """Return the error of an answer on the own mesh by its difference to that on the other one, both relative."""
+        """Return the relative error of an answer on the own mesh from its relative difference to the other one."""
         if self.ratio > 1.0:
             return error_of(difference, self.order, self.ratio)
         return difference + error_of(difference, self.order, 1.0 / self.ratio)
@@ -56,18 +56,18 @@ class OtherMesh:
 def on_other_mesh(
     problem: Problem, system: Any, moving: bool = True, finer: bool = False, alone: bool = False
 ) -> OtherMesh | None:
-    """Return a problem on half the cells or a finer mesh, without what its own system leaves out.
+    """Return a problem on half the cells or on a finer mesh; None where there is no other mesh.
 
-    Half the cells will do if each is at least 1.5 times as long there. Where nodes that a section, a mass or a load
-    asks for fix some, or there is one cell across, all are halved in length. Where that cannot be either, as of a mesh
-    file, they have one degree more. None where there is no other mesh at all.
+    Half the cells are taken if each is at least 1.5 times as long there. If nodes of a section, a mass or a load
+    prevent that, or there is one cell across, all cells are halved. A mesh file gets one degree more. Effects that the
+    own system leaves out are left out.
 
     Args:
         problem: what is computed.
         system: the problem's system on its own mesh.
-        moving: whether the other one will be stepped in time.
-        finer: whether only a finer mesh will do.
-        alone: whether each process is to have the whole of it.
+        moving: whether the other system will be stepped in time.
+        finer: whether only a finer mesh is wanted.
+        alone: whether each process has the whole mesh.
     """
     problem, own, degree = problem.replace(outputs={}), lines(system), system.V.element.basix_element.degree
     comm = MPI.COMM_SELF if alone else system.comm
@@ -85,7 +85,7 @@ def on_other_mesh(
 
 
 def _meshes(problem: Problem, system: Any, finer: bool) -> list[Any]:
-    """Return meshes that may be compared with that of a problem's system, the preferred one first."""
+    """Return candidates for the other mesh, the preferred one first."""
     mesh, topology, changes = problem.mesh, system.structure.mesh.topology, list[dict[str, Any]]()
     n: Any = mesh.elements
     if getattr(problem.structure, "mesh_file", None) is None:  # a structure of a user need not say it
@@ -106,7 +106,7 @@ def lines(system: Any) -> list[Array]:
 
 
 def lengths(there: Sequence[npt.ArrayLike], here: Sequence[npt.ArrayLike]) -> Array:
-    """Return the lengths of the intervals of some lines by those of others that their middle is in, of all axes."""
+    """Return, for all intervals of some lines, the length there over the length here at their middle, of all axes."""
     ratios = []
     for a, b in zip(map(np.asarray, here), map(np.asarray, there), strict=True):
         middle = (a[1:] + a[:-1]) / 2
@@ -118,7 +118,7 @@ def lengths(there: Sequence[npt.ArrayLike], here: Sequence[npt.ArrayLike]) -> Ar
 
 
 def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
-    """Return what makes local dof arrays of one system such of another one by interpolation; None where none does.
+    """Return the interpolation of local dof arrays of one system on the mesh of another; None where there is none.
 
     Args:
         of: system of the arrays.

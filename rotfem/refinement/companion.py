@@ -1,11 +1,11 @@
 """Companions of a march: the same problem in steps of twice the length, on a coarser mesh, or in a richer theory.
 
-A companion is one more march on a system of its own. It takes two steps of the march that it follows as one, wherever
-nothing prescribed lies between them, or the same ones as another companion; so it meets the same instants. Its first
-guess of a step is the motion that it follows plus the difference so far: mostly one Newton iteration is left to do.
+A companion is a second march in lockstep, on a system of its own. It takes two steps of the followed march as one if
+no knot lies between them, or the same steps as another companion. Newton's method starts from the followed motion plus
+the difference so far, and mostly needs one iteration.
 
-Differences become errors by an order (see `rotfem.refinement.estimate`): that of elements, or that of the scheme up to
-`CERTAIN`. Of schemes of higher order the difference itself is the error.
+An error follows from a difference by the order of the elements, or by that of the scheme up to `CERTAIN`
+(`rotfem.refinement.estimate`). For schemes of higher order it is the difference itself.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Start = Callable[[Any], tuple[Array | None, Array | None]]
 
 @dataclass
 class Followed:
-    """Steps of the march that is followed, which a companion takes as one.
+    """Steps of the followed march that a companion takes as one.
 
     Attributes:
         leg: from the start of the first to the end of the last.
@@ -61,12 +61,12 @@ class Followed:
 
 
 class FollowingStepper(Stepper):
-    """Stepper whose first guess is a motion that it follows plus the difference so far.
+    """Stepper whose prediction is the followed motion plus the difference so far.
 
     Attributes:
-        followed: over the next step; None where there is no such guess.
-        carried: makes q of the motion that is followed one on its own mesh; None where nothing does.
-        differences: (t, difference) at the ends of the last two steps, s.
+        followed: steps of the followed march; None where they give no prediction.
+        carried: interpolates q of the followed march on the own mesh; None where that is not possible.
+        differences: (t, difference of q) at the ends of the last two steps, s.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton, carried: Callable[[Array], Array] | None):
@@ -83,7 +83,7 @@ class FollowingStepper(Stepper):
         return False
 
     def predicted(self, stage: Stage, state: State) -> Array:
-        """Return q followed, plus the difference at the start of the step, growing as over the step before."""
+        """Return the followed q plus the difference, extrapolated linearly from the last two steps."""
         step = self.followed
         if step is None or self.carried is None or state.reference is not step.end.reference:
             return super().predicted(stage, state)
@@ -94,11 +94,11 @@ class FollowingStepper(Stepper):
             before, other = self.differences[0]
             guess += (stage.t - t) / (t - before) * (difference - other)
         clamped = self.system.held.clamped
-        guess[clamped] = stage.q[clamped]  # no iteration corrects them: round-off of what is carried would add up
+        guess[clamped] = stage.q[clamped]  # no iteration corrects the round-off of interpolation there
         return guess
 
     def _followed_at(self, t: float, step: Followed) -> Array:
-        """Return q of the motion that is followed at a time in a step of it, s."""
+        """Return q of the followed march at a time (s) within a step."""
         old, new = next((pair for pair in step.steps if t <= pair[1].t), step.steps[-1])
         if not old.t < t < new.t:
             return old.q if t <= old.t else new.q
@@ -108,7 +108,7 @@ class FollowingStepper(Stepper):
         return np.asarray(share ** np.arange(len(curve)) @ curve)
 
     def follow(self, step: Followed, state: State) -> None:
-        """Take a step as the one that is followed from a state."""
+        """Prepare the predictions of a step from a state."""
         self.followed, self._there, self._curves = None, None, {}
         if self.system.solved_at_once or self.carried is None:
             return
@@ -120,7 +120,7 @@ class FollowingStepper(Stepper):
             self.differences = [(state.t, state.q - self.carried(step.steps[0][0].q))]
 
     def arrived(self, state: State) -> None:
-        """Take note of the difference at the end of the step that was followed."""
+        """Record the difference at the end of the followed step."""
         if self.followed is None or self._there is None or state.reference is not self.followed.end.reference:
             self.differences = []
         else:
@@ -128,29 +128,29 @@ class FollowingStepper(Stepper):
 
 
 class Companion:
-    """A march that follows another one; a watch of the steps of that.
+    """A march that follows another one, as an observer of its steps.
 
     Args:
-        system: its own, of the problem of the march that is followed or of another one with the same outputs.
-        followed: the system of that march.
+        system: its own, of the same problem or of another one with the same outputs.
+        followed: the system of the followed march.
         scheme: of both.
-        newton: iteration control of the march that is followed.
+        newton: iteration control of the followed march.
         doubles: whether it takes two steps as one.
         further: companions that follow this one.
-        output: that the two are compared by, at the ends of its steps.
-        interval: between rows, s; they are also compared in the row next to the middle of every step. None where rows
-            are ends of steps.
+        output: compared at the ends of its steps.
+        interval: between rows, s: the outputs are also compared in the row nearest to the middle of every step. None
+            where rows are ends of steps.
 
     Attributes:
         state: reached; None before `begin`.
-        difference: largest distance of the two outputs so far, and when, s.
-        components: largest difference of every component of them.
-        path: length of the way of its output so far, from one end of a step to the next.
-        doubled: part of that in doubled steps.
+        difference: largest distance of the two outputs so far, and its time, s.
+        components: largest difference of every component.
+        path: length of the path of its output so far, summed over steps.
+        doubled: length of that in doubled steps.
         last: output at the end of the last step.
-        sound: whether all its steps could be solved, and it is no farther away than the limit.
-        limit: largest distance up to which it goes on.
-        part: of the difference so far to which its steps are solved, where that is more than the tolerance.
+        sound: whether all steps were solved, and the distance is below the limit.
+        limit: distance at which it stops.
+        part: Newton tolerance as a part of the difference so far, where that is above the own tolerance.
     """
 
     limit: float = float(np.finfo(float).max)
@@ -178,7 +178,7 @@ class Companion:
         self.difference, self.path, self.doubled, self.sound = (0.0, 0.0), 0.0, 0.0, True
         self.last: tuple[float, ...] = ()
         self.components: tuple[float, ...] = ()
-        #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
+        #: Steps seen and not taken: one that may be doubled with the next, and one whose next leg is not known.
         self.waiting: list[Followed | None] = [None, None]
 
     def begin(self, q: Array | None, v: Array | None = None) -> None:
@@ -197,10 +197,10 @@ class Companion:
         self.components = (0.0,) * len(self.last)
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
-        """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
+        """Observe a step of the followed march, and take the own steps that are complete with it."""
         if not self.sound:
             return
-        if self.followed.held.structure.turns is not None:  # it may count the rotations of these states afresh
+        if self.followed.held.structure.turns is not None:  # these states may get another reference rotation
             old, new = copy(old), copy(new)
         step, (single, _) = Followed(leg, ((old, new),)), self.waiting
         if single is not None:
@@ -216,7 +216,7 @@ class Companion:
             self._is_known(step)
 
     def finish(self) -> None:
-        """Take the last steps."""
+        """Take the remaining steps."""
         single, _ = self.waiting
         if single is not None:
             self._is_known(single)
@@ -264,11 +264,11 @@ class Companion:
             self.sound = False
 
     def _compare(self, here: State, there: State) -> tuple[float, ...]:
-        """Take note of the distance of the outputs at an instant, and return its own one."""
+        """Record the distance of the outputs at an instant; return the own output."""
         own = self.output(self.system, here)
         apart: Any = (own - self.output(self.followed, there)).tolist()
         size = hypot(*apart)
-        self.sound &= size <= self.limit  # not where it is no number
+        self.sound &= size <= self.limit  # false for nan
         self.components = tuple(max(a, abs(b)) for a, b in zip(self.components, apart, strict=True))
         if size > self.difference[0]:
             self.difference = size, there.t
@@ -277,35 +277,35 @@ class Companion:
         return tuple(map(float, own))
 
 
-#: Order of a scheme up to which it is that of all motions. Stiff components reduce the order of others to that of their
-#: stages (Hairer & Wanner 1996, section IV.15), or below: no order is known of them.
+#: Order up to which a scheme's order holds for all motions. That of others is reduced by stiff components, to the stage
+#: order or below (Hairer & Wanner 1996, section IV.15): it is taken as unknown.
 CERTAIN = 2
 
 
 def richer_problem(problem: Problem) -> Problem | None:
-    """Return a problem in the theory that its answers are compared with; None where there is none."""
+    """Return a problem in the richer theory that it is compared with; None where there is none."""
     richer = compared(problem.theory, problem.structure.type)
     return None if richer is None else problem.replace(theory=richer)
 
 
 class HistoryErrors:
-    """The errors of a march by its companions; a watch of its steps.
+    """The errors of a march by its companions, as an observer of its steps.
 
     Args:
         problem: what is computed.
-        system: its system, which marches.
+        system: its system.
         scheme: of its steps.
         newton: its iteration control.
-        start: what it starts from.
-        output: whose errors these are.
+        start: of the march.
+        output: whose errors are wanted.
         interval: between rows, s; None where they are ends of steps.
-        richer: the problem in the theory that its answers are compared with; None for none.
+        richer: the problem in a richer theory; None for none.
 
     Attributes:
-        steps: companion in steps of twice the length; followed by the others.
-        mesh: companion in the same long steps on another mesh; None without one.
+        steps: companion in doubled steps; the others follow it.
+        mesh: companion in the doubled steps on another mesh; None without one.
         other: that mesh; None without one.
-        theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
+        theory: companion in the doubled steps in the richer theory, compared at the tip; None without one.
     """
 
     def __init__(
@@ -338,15 +338,17 @@ class HistoryErrors:
 
     @property
     def companions(self) -> list[Companion]:
-        """All of them, each after the one that it follows."""
+        """All companions, each after the one that it follows."""
         return [self.steps, *self.steps.further]
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
-        """Take note of a step of the march."""
+        """Observe a step of the march."""
         self.steps(old, new, leg)
 
     def errors(self, scale: float) -> dict[str, float | None]:
-        """Return the errors by the steps, `time`, and by the mesh, `space`, at the end of the march; None is unknown.
+        """Return the relative errors by the steps, `time`, and by the mesh, `space`; None where unknown.
+
+        Where a part f ≥ 1/2 of the path was in doubled steps, the difference is divided by f.
 
         Args:
             scale: largest value of the output.
@@ -354,8 +356,7 @@ class HistoryErrors:
         self.steps.finish()
         steps, mesh, scale = self.steps, self.mesh, scale if scale > 0.0 else np.inf
         out: dict[str, float | None] = {"time": None, "space": None}
-        if steps.sound and steps.doubled >= steps.path / 2:  # less says too little
-            # as if all of the way had been doubled
+        if steps.sound and steps.doubled >= steps.path / 2:
             whole = steps.difference[0] * (steps.path / steps.doubled if steps.doubled > 0.0 else 1.0)
             out["time"] = error_of(whole / scale, self.scheme.order if self.scheme.order <= CERTAIN else 0)
         if steps.sound and mesh is not None and mesh.sound and self.other is not None:

@@ -1,4 +1,4 @@
-"""Outputs of answers, and how far two answers are apart in them."""
+"""Outputs of answers, and the distance of two answers in them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def root_moment(system: Any, state: State) -> Array:
     return np.array([value for name, value in system.root_reaction().items() if name.startswith("m")])
 
 
-#: Outputs by the names that `accuracy_of` has for them, and how their columns of a history begin.
+#: Outputs by their names in `accuracy_of`, and the prefix of their columns of a history.
 OUTPUTS: dict[str, Output] = {"tip": tip, "root_moment": root_moment}
 COLUMNS = {"tip": "tip_u", "root_moment": "root_m"}
 
@@ -54,10 +54,7 @@ def distance_each(one: Array, other: Array) -> float:
 
 
 def sizes(values: Array) -> Array:
-    """Return what errors of eigenvalues, complex or (n, components), are relative to, (n,): their absolute values.
-
-    Of one that is zero it is the least that is not.
-    """
+    """Return the absolute values (n,) of eigenvalues, complex or (n, components); for a zero the least other one."""
     out = np.array([np.linalg.norm(a) for a in values])
     out[out == 0.0] = min(out[out > 0.0], default=1e-300)
     return out

@@ -1,11 +1,11 @@
-"""The error of an answer by its distance to a coarser one, and what a result says of its own error.
+"""The error of an answer by its difference to a coarser one, and the error table of a result.
 
 Let u_h be an answer in steps or cells of size h, of order p. In the asymptotic range
 
     |u_h − u| = |u_h − u_rh| / (r^p − 1)
 
 (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4). Beyond it, or where no order is known, the
-error reported is the difference itself. What cannot be computed is unknown.
+error reported is the difference itself.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Relative difference of two answers up to which their order is believed.
+#: Relative difference of two answers up to which they count as in the asymptotic range.
 ASYMPTOTIC = 0.05
 
-#: Sum of the contributions above which it is reported, where no accuracy was asked for.
+#: Total error above which a warning names its causes, where no accuracy was asked for.
 NOTICED = 0.01
 
-#: What the shares are called in text.
+#: Contributions to an error as they are called in text.
 WORDS = {"time": "steps", "space": "mesh", "model": "model", "round_off": "round-off"}
 
 
 def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
-    """Return the error of the finer of two answers.
+    """Return the error of the finer of two answers, relative.
 
     Args:
-        difference: relative.
+        difference: of the two, relative.
         order: of convergence; 0 where none is known.
         ratio: of their step or cell sizes.
     """
@@ -38,11 +38,11 @@ def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
 
 @dataclass(frozen=True)
 class ErrorEstimate:
-    """Shares of an error, relative to `scale` of a run and to each frequency of modes; None where nothing is known.
+    """Contributions to an error, relative to `scale` of a run or to each frequency of modes; None where unknown.
 
     Attributes:
         contributions: name (`time`, `space`, `model`, `round_off`) ↦ relative error.
-        found: further facts: instants, the scale, how a share was found.
+        found: further entries of the summary: instants, the scale.
     """
 
     contributions: dict[str, float | None]
@@ -50,12 +50,12 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float | None:
-        """Sum of the shares; None where one is unknown."""
-        known = [float(share) for share in self.contributions.values() if share is not None]
+        """Sum of the contributions; None where one is unknown."""
+        known = [float(part) for part in self.contributions.values() if part is not None]
         return sum(known) if known and len(known) == len(self.contributions) else None
 
     def summary(self) -> dict[str, Any]:
-        """Return what a summary has of it."""
+        """Return the table `error` of a summary."""
         return {**self.contributions, "total": self.total, **self.found}
 
 
@@ -67,8 +67,8 @@ def error_line(summary: dict[str, Any]) -> str:
     return f"error (estimated): {percent(summary['total'])} ({parts})"
 
 
-def percent(share: float | None) -> str:
-    """Return a share in per cent with two digits."""
-    if share is None:
+def percent(ratio: float | None) -> str:
+    """Return a ratio in per cent with two digits, of large ones three."""
+    if ratio is None:
         return "unknown"
-    return "0 %" if share < 5e-9 else f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.3g} %"
+    return "0 %" if ratio < 5e-9 else f"{100 * ratio:.2g} %" if ratio < 0.995 else f"{100 * ratio:.3g} %"

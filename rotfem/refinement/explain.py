@@ -1,16 +1,15 @@
-"""What every effect and every theory changes: answers with one less, or another theory, against the scene's own.
+"""The change of an answer by every effect and every theory: models that differ in one of them, against the scene's own.
 
-A history is marched once, with the companions that know its error (`rotfem.refinement.companion`). Then the own
-model is marched on half the cells in steps as long as that error allows, followed by one companion for every model that
-differs by one effect or by the theory. So the two have mesh, steps and their errors in common, and what is between them
-is the change by the model,
+A history is marched once, with the companions for its error (`rotfem.refinement.companion`). Then the own model is
+marched on half the cells in steps as long as that error allows, followed by one companion for every model that differs
+by one effect or by the theory. Both have the same mesh and steps, so their distance is the change by the model,
 
     max_t |u_model − u_own| / max_t |u_own|,    max_i |λ_model,i − λ_own,i| / |λ_own,i|,
 
-with u the displacement of the tip and λ the eigenvalues, sorted by size. Their errors are not the same where steps damp
-or delay the one more than the other. So changes that are neither negligible nor large are marched again in half the
-steps, and all that are not large where the own answer is in error by more than the asymptotic range. Steady states and
-modes are on half the cells, too.
+with u the displacement of the tip and λ the eigenvalues, sorted by size. Steps may damp or delay one model more than
+the other. So changes that are neither negligible nor large are computed again in half the steps; so are all that are
+not large if the error of the own answer is outside the asymptotic range. Steady states and modes are on half the cells,
+too.
 """
 
 from __future__ import annotations
@@ -44,15 +43,14 @@ T = TypeVar("T")
 #: Names of the outputs that models are compared by.
 HISTORY, STEADY, MODES = "history", "steady", "modes"
 
-#: Factor within which a change is to be known, so that of two that differ by more the larger one is a bound; a relative
-#: change that is not negligible; one that is large. The three words of a verdict are defined by them.
+#: Factor within which two computed changes must agree, else the larger one is a bound; relative changes from which one
+#: is noticeable, and large. They define the words of a verdict.
 SAFETY, NOTICEABLE, LARGE = 3.0, 1e-2, 1e-1
 
-#: Changes below are not distinguished from none: Newton's increments, and round-off of eigenvalues.
+#: Smallest change that is resolved: Newton's increments, and round-off of eigenvalues.
 RESOLVED = 1e-8
 
-#: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
-#: a sine that is late by a twelfth of its period is as far from itself.
+#: Relative error of a history above which changes are unknown: that of a sine delayed by a twelfth of its period.
 FAR = 0.5
 
 
@@ -99,7 +97,9 @@ class Case:
         Raises:
             ComputationError: there is none.
         """
-        return plainly(system, lambda: steady_state(system, speed, self.newton(), past_limits=self.past_limits))
+        return with_plain_tangents(
+            system, lambda: steady_state(system, speed, self.newton(), past_limits=self.past_limits)
+        )
 
     def start(self, system: Any) -> tuple[Array | None, Array | None]:
         """Return (q, q̇) of a system at t = 0, local dof arrays; None where it is undeformed, or at rest.
@@ -107,7 +107,7 @@ class Case:
         Raises:
             ComputationError: there is no such state.
         """
-        return plainly(system, lambda: self.first(system))
+        return with_plain_tangents(system, lambda: self.first(system))
 
     def eigenvalues(self, system: Any, speed: float) -> Array:
         """Return λ of the wanted modes at a speed (rad/s): no rigid body, of an overdamped mode the slow one.
@@ -117,14 +117,14 @@ class Case:
         """
         analysis = ModalAnalysis(system.model.problem, self.about, self.newton(), system.comm, system)
         analysis.past_limits = self.past_limits
-        spinning = plainly(system, lambda: analysis.at(speed, self.mode_count))
+        spinning = with_plain_tangents(system, lambda: analysis.at(speed, self.mode_count))
         names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
         lasting = [not name.endswith(", fast") for name in names]  # overdamped ones have two eigenvalues
         return np.asarray(spinning.pairs.resolved[: len(names)][lasting])
 
 
-def plainly(system: Any, compute: Callable[[], T]) -> T:
-    """Return what is computed with plain tangents, or where that fails with those that take longer to compile."""
+def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+    """Return the result of a computation with the plain tangent; if that fails, with that of `PointStresses`."""
     held = system.held
     held.plain = True
     try:
@@ -146,22 +146,22 @@ class History:
     tips: Array
 
     def distance(self, coarse: History) -> float:
-        """Return the largest distance of one in longer steps at its times, relative to the largest displacement."""
+        """Return the largest distance to one in longer steps, at its times, relative to the largest displacement."""
         return distance(CubicSpline(self.times, self.tips)(coarse.times), coarse.tips)
 
 
 @dataclass
 class Change:
-    """What one step from a model to another changes, or what steps or mesh do.
+    """A change of the answer by an effect or a theory, or the error by steps or mesh.
 
     Attributes:
         kind: "effect", "theory" or "discretisation".
-        name: of the effect, of the theory that takes the place of the model's, or the key that is too coarse.
-        included: whether the model itself has it.
-        estimate: output ↦ relative change; infinite where the other model fails, None where nothing is known.
+        name: of the effect, of the other theory, or the key of steps or mesh.
+        included: whether the own model has it.
+        estimate: output ↦ relative change; infinite where the other model fails, None where unknown.
         notes: output ↦ why a model fails.
         truth: output ↦ relative change on the case's own mesh and steps, where it was computed.
-        bounds: outputs whose change is only known to be below the estimate.
+        bounds: outputs whose estimate is an upper bound.
     """
 
     kind: str
@@ -173,10 +173,10 @@ class Change:
     bounds: list[str] = field(default_factory=list)
 
     def settle(self, output: str, size: float | None, rough: float | None, error: float) -> bool:
-        """Take the size of the change of an output; return whether it is known.
+        """Set the size of the change of an output; return whether it is known.
 
-        That is one that is large, one that is negligible while the own answer is in the asymptotic range, and one that
-        is the same in steps of twice the length within SAFETY.
+        It is known if it is large, if it is negligible with the own answer in the asymptotic range, or if it agrees
+        within SAFETY with that in steps of twice the length.
 
         Args:
             output: name.
@@ -197,12 +197,12 @@ class Change:
 
     @property
     def worst(self) -> float:
-        """Largest estimate over the outputs, of those that are known."""
+        """Largest known estimate over the outputs."""
         return max((x for x in self.estimate.values() if x is not None), default=0.0)
 
     @property
     def verdict(self) -> str:
-        """Word for it: "negligible" (below 1 % even with the safety factor), "noticeable", "large", or "unknown"."""
+        """Word for it: "negligible" (SAFETY times it is below 1 %), "noticeable", "large" or "unknown"."""
         if self.worst >= LARGE:
             return "large"
         if None in self.estimate.values():
@@ -210,7 +210,7 @@ class Change:
         return "negligible" if SAFETY * self.worst < NOTICEABLE else "noticeable"
 
     def row(self) -> dict[str, Any]:
-        """Return it as a dictionary fit for JSON."""
+        """Return it as a dictionary for JSON."""
         row: dict[str, Any] = {"kind": self.kind, "name": self.name, "included": self.included}
         row |= {"estimate": self.estimate, "worst": self.worst, "verdict": self.verdict}
         more = {"notes": self.notes, "truth": self.truth, "bounds": self.bounds}
@@ -228,7 +228,7 @@ class Explanation:
         InputError: a mesh or a section that cannot be computed with.
 
     Attributes:
-        effects: all that there are data for; `own` are those of the model.
+        effects: all with data; `own` are those of the model.
         absent: output ↦ why there is none; `wanted` are the others.
         system: of the own model on the case's mesh.
         speed: of the modes, rad/s.
@@ -328,34 +328,32 @@ class Explanation:
         return other
 
     def _refine(self, system: Any, own: History, error: float | None) -> None:
-        """March the changes in steps as long as the error allows, and those in doubt again in shorter ones.
-
-        Where a change is not the same in two step lengths within a factor of SAFETY, it is below the larger of the two.
+        """Compute the changes in steps as long as the error allows, and those not known again in halved steps.
 
         Args:
             system: of the own model, on the mesh of the comparison.
             own: its history in the case's own steps.
             error: of that by the steps, relative; None where it is unknown.
         """
-        scheme, doubt, before, rough = self._scheme, self.changes, own, dict[str, float | None]()
+        scheme, pending, before, rough = self._scheme, self.changes, own, dict[str, float | None]()
         if error is None or error > FAR:
             error, ratio = np.inf, 0.5
         elif error > ASYMPTOTIC:
             ratio = 2.0
         else:
             ratio = max(2.0, (ASYMPTOTIC / SAFETY / max(error, RESOLVED)) ** (1 / scheme.order) // 1)
-        while doubt and ratio >= 0.25:
+        while pending and ratio >= 0.25:
             try:
-                history, found = self._changed(system, ratio, doubt)
+                history, found = self._changed(system, ratio, pending)
             except ComputationError:
                 history, found, reached = own, dict[str, float | None](), np.inf
             else:
                 longer = ratio >= 1.0
                 apart = own.distance(history) if longer else history.distance(before)
                 reached = error + apart if longer else error_of(apart, min(scheme.order, CERTAIN))
-            doubt = [
+            pending = [
                 change
-                for change in doubt
+                for change in pending
                 if not change.settle(HISTORY, found.get(change.name), rough.get(change.name), reached)
             ]
             before, rough, ratio = own if ratio > 1.0 else history, found, ratio / 2.0
@@ -368,20 +366,20 @@ class Explanation:
             changed = {"tolerance": min(steps.tolerance * ratio**self._scheme.order, ASYMPTOTIC)}
         return Steps(**(vars(steps) | changed))
 
-    def _marched(self, system: Any, steps: Steps, watches: Sequence[Companion]) -> History:
+    def _marched(self, system: Any, steps: Steps, companions: Sequence[Companion]) -> History:
         """Return the history of the own model, followed by companions."""
         case, times, tips = self.case, list[float](), list[Array]()
         march = March(system, self._scheme, steps, case.newton(), *case.start(system))
-        march.stepper.observers = list(watches)
+        march.stepper.observers = list(companions)
         for state in march:
             size = float(system.size(state.q))
             tips.append(tip(system, state))
-            if system is self.system:  # what a march that fails has reached, too
+            if system is self.system:  # at every step, for marches that fail
                 self.size, self.scale = max(self.size, size), max(self.scale, float(np.linalg.norm(tips[-1])))
             if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
                 raise ComputationError(f"it diverges at t = {state.t:.4g} s")
             times.append(state.t)
-        for companion in watches:
+        for companion in companions:
             companion.finish()
         return History(np.array(times), np.array(tips))
 
@@ -450,8 +448,8 @@ class Explanation:
     ) -> None:
         """Write the changes of an output that needs no history.
 
-        They are computed on half the cells. Where these have errors that are not negligible, they are computed on all
-        cells instead, whose own error is then seen on finer ones, and on those where it is beyond the asymptotic range.
+        They are computed on half the cells. If the error there is above NOTICEABLE they are computed on all cells,
+        whose error is that to a finer mesh, and if this is above ASYMPTOTIC on the finer mesh.
 
         Args:
             name: of the output.

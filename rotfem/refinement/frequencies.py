@@ -1,18 +1,17 @@
-"""The errors of frequencies: modes on half the cells, and in a richer theory; and the phase that such an error makes.
+"""The errors of frequencies by the mesh and by the theory, and the phase error that follows.
 
-The difference of an eigenvalue to that of the same mode on half the cells says its error (see
-`rotfem.refinement.coarser`). The error by a theory is the difference itself. The same mode is the one whose shape is
-most alike in x^H M x; of several shapes that are, as those of the two whirls of a shaft above its critical speed, it is
-the one of the nearest eigenvalue.
+The error by the mesh is that of the difference to the same mode on half the cells (`rotfem.refinement.coarser`), the
+error by the theory the difference itself. Modes are matched by their shapes in x^H M x; of several similar shapes, as
+those of the two whirls of a shaft above its critical speed, the nearest eigenvalue is taken.
 
-The stress stiffness of a linear theory is that of the undeformed structure, so its eigenvalues λ are in error by dλ.
-What a start with q₀ and v₀, relative to the equilibrium, has of a mode with right and left vectors x and y is c x with
+The stress stiffness of a linear theory is that of the undeformed structure, so its eigenvalues λ are in error by dλ. A
+start with q₀ and v₀, relative to the equilibrium, has the part c x of a mode with right and left vectors x and y,
 
     c = yᴴ[(λM + C)q₀ + Mv₀] / yᴴ(2λM + C)x
 
 (Tisseur & Meerbergen, SIAM Review 43 (2001) 235, section 3). After the time T, or where damping −Re λ ends the
-vibration sooner, it is out of phase by |dλ| T. What drives a motion keeps its phase: this is of motions that nothing
-drives.
+vibration sooner, it is out of phase by |dλ| T. This holds for free vibrations; excited ones have the phase of the
+excitation.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from rotfem.refinement.distance import sizes
 
 Array = npt.NDArray[Any]
 
-#: Modes in addition to those wanted that are computed on a coarser mesh, where they may come in another order.
+#: Modes computed beyond those wanted on the other mesh, where their order may differ.
 SPARE = 4
 
 
@@ -49,9 +48,9 @@ class FrequencyErrors:
         richer: the problem in the theory that frequencies are compared with; None for the errors by the mesh.
 
     Attributes:
-        there: analysis of the problem on another mesh or in that theory; None where there is nothing to compare with.
-        values: λ there, at the speed of the last call; and `resolved`, zero where they are so to round-off.
-        carried: their vectors at the nodes of the analysed mesh, without the hub; None where it has others.
+        there: analysis of the problem on the other mesh or in that theory; None where there is none.
+        values: λ there, at the speed of the last call; and `resolved`, with 0 for those that are zero to round-off.
+        carried: their vectors at the nodes of the own mesh, without the hub; None where these cannot be interpolated.
     """
 
     def __init__(self, analysis: ModalAnalysis, richer: Problem | None = None):
@@ -69,14 +68,14 @@ class FrequencyErrors:
         self._error: Callable[[float], float] = float
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
-        """Return the error of every eigenvalue relative to `sizes`, as far as they are resolved; None if unknown."""
+        """Return the error of every eigenvalue relative to its `sizes`, None where it is unknown."""
         lam = spinning.pairs.resolved
         if not len(lam) or not self._found(spinning.speed, len(lam) + int(spinning.rigid)):
             return [None] * len(lam)
         return [self._error(float(d)) for d in np.abs(self._matched(spinning) - lam) / sizes(lam)]
 
     def near(self, speed: float, count: int) -> Array | None:
-        """Return the modes on half the cells as columns of the analysed mesh, if it is large; its matrices are freed.
+        """Return the modes on half the cells as columns on the own mesh, None if that is small; free their matrices.
 
         Args:
             speed: Ω, rad/s.
@@ -146,10 +145,10 @@ class FrequencyErrors:
 
 
 def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float, newton: Newton) -> float | None:
-    """Return by how much the error of a linear theory's frequencies moves the tip, m; None where it is unknown.
+    """Return the error of the tip by the phase error of a linear theory, m; None where it is unknown.
 
     Args:
-        problem: a linear theory's, at constant speed, with nothing that drives its motion.
+        problem: of a linear theory, at constant speed and without excitation.
         system: equations of motion, the hub held; its state and time are set.
         start: q and v at t = 0, local dof arrays.
         time: that passes, s.

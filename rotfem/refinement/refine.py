@@ -1,15 +1,14 @@
-"""Refinement to an accuracy: from a coarse answer on, every contribution to its error by its order.
+"""Refinement to an accuracy: from a coarse answer on, every contribution to its error is reduced by its order.
 
-An answer knows its error as the difference of two computed ones (`rotfem.refinement.companion`). With e the
-contribution of steps or mesh and s what it may be, the next answer has
+The error of an answer is known from differences of computed ones (`rotfem.refinement.companion`). With e the
+contribution of steps or mesh and s the allowed one, the next answer has
 
     tolerance' = tolerance · s/e,    n' = n (e/s)^{1/(k + 1)},
 
-n the number of elements of degree k; a model whose own error is too large gives way to the next richer one. The loop
-ends with the first answer whose error is within the accuracy, or where nothing left to refine would help, or where the
-next answer would take more than what is left of a budget. A finer setting that gives the same answer is the last, too:
-steps are no more exact than the increments of Newton's method. What one took, and how its work grows, says what the
-next one takes.
+n the number of elements of degree k. A model whose own error is too large is replaced by the next richer one. The loop
+ends with the first answer whose error is within the accuracy, if nothing is left to refine, if a finer setting gives
+the same answer (steps are no more exact than the increments of Newton's method), or if the next answer would exceed
+the budget. Its time is predicted from the last one.
 """
 
 from __future__ import annotations
@@ -27,27 +26,27 @@ from rotfem.listeners import Compiling, Hint, cpu_time
 
 R = TypeVar("R")
 
-#: Factor within which estimates of errors hold (theory.md, section 18): answers are accepted with it. The part of the
-#: steps is accepted as it is: of the fourth-order scheme the difference is not divided by what an order promises.
+#: Safety factor of estimated errors (theory.md, section 18). The part of the steps needs none: the difference of a
+#: fourth-order scheme is not divided by 2^p − 1.
 SAFETY = 2.0
 
-#: Answers at most.
+#: Largest number of answers.
 MOST = 8
 
-#: Part of what a contribution may be that the next answer aims at.
+#: Aim of the next answer, as a part of the allowed contribution.
 AIM = 0.5
 
-#: Tolerance to begin with under a budget, so that something is reached.
+#: First tolerance under a budget.
 COARSE = 1e-2
 
-#: Ratio of steps and cells of two answers whose difference is the error of the finer one, or more, by order 2 or more.
+#: Ratio of steps or cells of two answers whose difference bounds the error of the finer one, for orders p ≥ 2.
 RATIO = math.sqrt(2.0)
 
-#: Highest degree of elements that a scene may ask for.
+#: Highest degree of elements.
 HIGHEST = 6
 
-#: Most by which the numbers of steps and of cells grow from one answer to the next: what errors say of finer ones is an
-#: extrapolation, and one over more than three halvings is none.
+#: Largest growth of the number of steps or cells from one answer to the next: errors are extrapolated over three
+#: halvings at most.
 MOST_GROWTH = 8.0
 
 Elements = int | tuple[int, int] | None
@@ -58,8 +57,8 @@ class Setting:
     """How an answer is computed.
 
     Attributes:
-        models: keys of [model] of the models there are, from the cheapest to the richest, that in use first.
-        elements: number of elements, (nx, ny) of a plate; None where a mesh file says it.
+        models: keys of [model] of the available models, from the cheapest to the richest; the first is in use.
+        elements: number of elements, (nx, ny) of a plate; None of a mesh file.
         degree: their polynomial degree.
         scheme: of the steps of a history; None without one.
         tolerance: of adaptive steps; None without.
@@ -100,20 +99,20 @@ class Setting:
         return out
 
     def summary(self) -> dict[str, Any]:
-        """Return the setting as far as it is in use."""
+        """Return the keys of the setting that are in use."""
         unused = {"models", "scheme", "tolerance"} if self.reduced else {"models"}
         used = {**self.models[0], **{key: value for key, value in asdict(self).items() if key not in unused}}
         return {key: value for key, value in used.items() if value is not None}
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
-        """Return the setting of a row or a summary that has its parts by name, with no other model than that."""
+        """Return the setting of a row or a summary, with its model alone."""
         model = {name: row[name] for name in ("theory", "reduced") if row.get(name)}
         elements = tuple(row["elements"]) if isinstance(row.get("elements"), list) else row.get("elements")
         return cls((model,), elements, row["degree"], row.get("scheme"), row.get("tolerance"), row.get("step"))
 
     def key(self) -> str:
-        """Return what identifies the setting: all of it as JSON."""
+        """Return an identifier of the setting: all of it as JSON."""
         return json.dumps(asdict(self), sort_keys=True)
 
     def words(self) -> str:
@@ -132,7 +131,7 @@ class Setting:
         return replace(self, models=self.models[1:]) if len(self.models) > 1 else None
 
     def finer(self, error: Mapping[str, Any], accuracy: float) -> Self | None:
-        """Return the setting after one whose answer has missed an accuracy; None where nothing helps.
+        """Return the next setting after an answer that missed the accuracy; None where nothing is left to refine.
 
         Args:
             error: `time`, `space` and `model` of the answer, as far as it has them, None where unknown; and `scale`, 0
@@ -149,7 +148,7 @@ class Setting:
             if contribution(error, "model") >= allowed:
                 return None
         parts = max(1, ("time" in error) + ("space" in error))
-        each = (allowed - contribution(error, "model")) / parts  # steps and mesh have the rest in equal parts
+        each = (allowed - contribution(error, "model")) / parts  # steps and mesh get equal parts of the rest
         if each <= 0.0:
             return None
         known, of_steps = contribution(error, "time"), SAFETY * each
@@ -160,9 +159,7 @@ class Setting:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
             growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
             if self.elements is not None:
-                new = replace(
-                    new, elements=grown(self.elements, min(max(growth, 1.25), MOST_GROWTH))
-                )  # less is no other
+                new = replace(new, elements=grown(self.elements, min(max(growth, 1.25), MOST_GROWTH)))
             elif self.degree < HIGHEST:
                 new = replace(new, degree=self.degree + 1)
             else:
@@ -170,11 +167,11 @@ class Setting:
         return self.richer() if new == self else new
 
     def coarser(self) -> dict[str, Self]:
-        """Return `time` and `space` ↦ a setting whose answer is so far from this one's as the error of this is at most.
+        """Return `time` and `space` ↦ a coarser setting; the difference of its answer bounds the error of this one.
 
-        Steps and cells are longer by r = √2 or more: with an order p ≥ 2 the difference is (r^p − 1) ≥ 1 times the
-        error. Steps of a fourth-order scheme are r times as long at r⁴ times the tolerance. Cells of a mesh file have
-        one degree less instead.
+        Steps or cells are longer by r = √2 or more: for an order p ≥ 2 the difference is (r^p − 1) ≥ 1 times the
+        error. Steps of a fourth-order scheme are r times as long at r⁴ times the tolerance. A mesh file gets one degree
+        less.
         """
         out = dict[str, Self]()
         if self.tolerance is not None:
@@ -185,12 +182,12 @@ class Setting:
         return out if fewer == self.elements else out | {"space": replace(self, elements=fewer)}
 
     def unknowns(self) -> float:
-        """Return what the number of unknowns is proportional to: that of nodes."""
+        """Return the number of nodes, which the number of unknowns is proportional to."""
         cells = self.elements if isinstance(self.elements, tuple) else (self.elements or 1,)
         return float(math.prod(n * self.degree + 1 for n in cells))
 
     def work(self) -> float:
-        """Return what the time of a step grows with, times the number of adaptive ones by a fourth-order scheme.
+        """Return a number proportional to the time of an answer: work of a step times number of adaptive steps.
 
         With n unknowns a step takes O(n) of a beam, whose matrices are a band, and O(n^{3/2}) of a plane mesh (nested
         dissection; A. George, SIAM J. Numer. Anal. 10, 1973).
@@ -200,7 +197,7 @@ class Setting:
 
 
 def contribution(error: Mapping[str, Any], name: str) -> float:
-    """Return a contribution to an error; 0 of one that is unknown or not there."""
+    """Return a contribution to an error; 0 if it is unknown or missing."""
     return float(error.get(name) or 0.0)
 
 
@@ -210,9 +207,9 @@ def is_known(error: Mapping[str, Any]) -> bool:
 
 
 def is_within(error: Mapping[str, Any], accuracy: float) -> bool:
-    """Return whether an error is known and within an accuracy: estimates with SAFETY, bounds as they are.
+    """Return whether an error is known and bounds + SAFETY · estimates is within an accuracy.
 
-    The difference by the steps counts as a bound, and so does that of round-off.
+    `time`, a plain difference, and `round_off` are bounds.
     """
     if not is_known(error) or error["total"] is None:
         return False
@@ -223,7 +220,7 @@ def is_within(error: Mapping[str, Any], accuracy: float) -> bool:
 def grown(
     elements: int | tuple[int, int], factor: float, rounded: Callable[[float], int] = math.ceil
 ) -> int | tuple[int, int]:
-    """Return numbers of elements that have grown by a factor, 1 in each direction at least."""
+    """Return numbers of elements times a factor, at least 1 in each direction."""
     if isinstance(elements, tuple):
         x, y = (max(1, rounded(n * factor)) for n in elements)
         return x, y
@@ -233,18 +230,18 @@ def grown(
 # --- time ------------------------------------------------------------------------------------------------------------
 
 
-class TooDear(ComputationError):
-    """An answer would take more than what is left of the budget."""
+class OverBudget(ComputationError):
+    """An answer would take more than is left of the budget."""
 
 
 class Clock:
-    """CPU time of the answers of a refinement, and what may be left of it.
+    """CPU time of the answers of a refinement, against a budget.
 
     Args:
-        budget: all may take together, s; None where there is no limit.
+        budget: of all answers together, s; None without a limit.
         comm: of the processes that compute them; rank 0 decides for all.
-        announce: takes a line on every answer that is long; None takes none.
-        key: what says the budget.
+        announce: called with a line before every long answer; None for none.
+        key: scene key or option of the budget.
     """
 
     def __init__(
@@ -255,50 +252,59 @@ class Clock:
         self._started, self._compiling, self._began, self._next = cpu_time(), Compiling.seconds, 0.0, 1
 
     def used(self) -> float:
-        """Return what has been used so far, s."""
+        """Return the time used so far, s."""
         return float(self.comm.bcast(cpu_time() - self._started))
 
     def compiled(self) -> float:
-        """Return what compilation has taken since the last answer began, s."""
+        """Return the time of compilation since the last answer began, s."""
         return float(self.comm.bcast(Compiling.seconds - self._compiling))
 
     def begin(self, words: str, number: int, predicted: float | None) -> None:
-        """Take note that answer `number` begins, of a setting in words, in a predicted time (s; None: not known).
+        """Begin an answer.
+
+        Args:
+            words: its setting.
+            number: of the answer, from 1.
+            predicted: time that it takes, s; None if unknown.
 
         Raises:
-            TooDear: that is more than what is left.
+            OverBudget: that is more than is left.
         """
         self._began, self._compiling, self._next = self.used(), Compiling.seconds, 1
         if self.budget is not None and predicted is not None and predicted > self.budget - self._began:
-            raise self._dear(predicted)
+            raise self._over(predicted)
         if predicted is not None and predicted > 5.0:
             self._announce(f"answer {number}: {words}: about {predicted:.2g} s")
 
     def __call__(self, steps: int, done: float) -> None:
-        """Take note of a step of an answer, after which a part of it is done.
+        """Check the budget after a step of an answer.
+
+        Args:
+            steps: taken so far.
+            done: part of the answer that is computed.
 
         Raises:
-            TooDear: the rest would take more than what is left.
+            OverBudget: the rest would take more than is left.
         """
         if self.budget is None or steps < self._next:
             return
         self._next = steps + max(1, steps // 8)
         start = self._began + self.compiled()
         left, elapsed = self.budget - start, self.used() - start
-        # a third of what is left shows how long adaptive steps take
+        # adaptive steps are extrapolated from a third of the remaining budget on
         if elapsed > left or (elapsed > left / 3 and elapsed > left * done):
-            raise self._dear(elapsed / done if done > 0.0 else None)
+            raise self._over(elapsed / done if done > 0.0 else None)
 
-    def _dear(self, predicted: float | None) -> TooDear:
+    def _over(self, predicted: float | None) -> OverBudget:
         self.wanted = predicted
         would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
         left = max(0.0, (self.budget or 0.0) - self._began)
-        return TooDear(
+        return OverBudget(
             f"{would}{left:.2g} s of {self.key} are left", advice=f"a looser accuracy, or a larger {self.key}"
         )
 
     def summary(self) -> dict[str, float | None]:
-        """Return what a summary has of a budget: `seconds`, `used` and `wanted`, of the answer that was too dear."""
+        """Return the table `budget` of a summary: `seconds`, `used`, and `wanted` by the answer that was refused."""
         return {"seconds": self.budget, "used": self.used(), "wanted": self.wanted}
 
 
@@ -323,19 +329,19 @@ class Answer(Generic[R]):
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """By what answers are better: those whose error is known come first, by their error."""
+        """Sort key: answers with a known error first, by their error."""
         total = self.error["total"]
         return (not is_known(self.error), math.inf if total is None else total)
 
 
 @dataclass
 class Refinement(Generic[R]):
-    """What a refinement has led to.
+    """The answers of a refinement.
 
     Attributes:
         tried: settings and errors of all answers.
         best: the best of them; None before the first.
-        failure: what ended it before its accuracy was met, where something failed or was too dear.
+        failure: why it ended before its accuracy was met; None if it did not.
     """
 
     tried: list[dict[str, Any]] = field(default_factory=list)
@@ -343,7 +349,7 @@ class Refinement(Generic[R]):
     failure: ComputationError | None = None
 
     def predicted(self, setting: Setting) -> float | None:
-        """Return the time (s) that an answer takes, from the best one of the same model; None where there is none."""
+        """Return the predicted time (s) of an answer, from the best one of the same model; None without one."""
         if self.best is None or self.best.setting.models != setting.models:
             return None
         return self.best.seconds * setting.work() / self.best.setting.work()
@@ -356,14 +362,14 @@ def refine(
     clock: Clock,
     found: Refinement[R] | None = None,
 ) -> Refinement[R]:
-    """Return the answers up to the first whose error is within an accuracy, or as far as they go.
+    """Return the answers up to the first whose error is within an accuracy, or up to the last possible one.
 
     Args:
         first: setting to begin with.
         compute: setting ↦ result and its error.
         accuracy: wanted.
         clock: of all answers.
-        found: where they are noted, for whom an interrupt leaves them.
+        found: that answers are added to, so that an interrupt leaves them; a new one if None.
 
     Raises:
         ComputationError: no answer was found.
@@ -378,11 +384,11 @@ def refine(
         except (InputError, ComputationError) as failure:  # a richer model may have what this one cannot
             why = failure.allowed if isinstance(failure, InputError) else failure.what
             found.tried.append({**setting.summary(), "failed": why, "seconds": clock.used() - began})
-            dear = isinstance(failure, TooDear)
-            following = None if dear else setting.richer()
+            over = isinstance(failure, OverBudget)
+            following = None if over else setting.richer()
             if following is None:
                 of_model = found.best is not None and found.best.setting.models == setting.models
-                if isinstance(failure, InputError) or found.best is None or not (dear or of_model):
+                if isinstance(failure, InputError) or found.best is None or not (over or of_model):
                     raise
                 found.failure = failure
             continue

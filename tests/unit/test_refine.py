@@ -15,7 +15,7 @@ from rotfem.commands.accuracy import Missed, to_accuracy
 from rotfem.errors import ComputationError, Stopped
 from rotfem.listeners import Compiling
 from rotfem.refinement.distance import distance
-from rotfem.refinement.refine import HIGHEST, MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
+from rotfem.refinement.refine import HIGHEST, MOST, SAFETY, Clock, OverBudget, Refinement, Setting, refine
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
@@ -174,8 +174,8 @@ def test_what_is_too_dear_is_said_with_what_to_try(monkeypatch: pytest.MonkeyPat
         to_accuracy(SCENE, SETTING, attempt, budget)
     assert "accuracy_budget" in caught.value.advice
     assert caught.value.result.summary["accuracy"]["budget"]["wanted"] > 10.0
-    with pytest.raises(TooDear):  # nothing was reached
-        to_accuracy(SCENE, SETTING, attempts(TooDear("nothing is left"))[1], clock(60.0))
+    with pytest.raises(OverBudget):  # nothing was reached
+        to_accuracy(SCENE, SETTING, attempts(OverBudget("nothing is left"))[1], clock(60.0))
 
 
 def test_what_is_compiled_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,7 +205,7 @@ def test_an_answer_that_is_too_dear_ends_while_it_goes_on(monkeypatch: pytest.Mo
             now[0] += 1.0
             budget(steps, steps / 100)
 
-    with pytest.raises(TooDear):
+    with pytest.raises(OverBudget):
         march()
     assert now[0] < 20.0
 

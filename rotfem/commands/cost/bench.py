@@ -31,7 +31,7 @@ from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.listeners import cpu_time
 from rotfem.refinement.coarser import lines
 from rotfem.refinement.distance import COLUMNS
-from rotfem.refinement.refine import Clock, Setting, TooDear
+from rotfem.refinement.refine import Clock, OverBudget, Setting
 from rotfem.results.files import opened, writing
 from rotfem.scene import Scene
 from rotfem.version import __version__
@@ -118,7 +118,7 @@ class Bench:
                 self._once(variant, out, clock)
             if out.values is not None and not np.all(np.isfinite(out.values)):
                 raise ComputationError("the output is not finite")
-        except TooDear as error:
+        except OverBudget as error:
             out.status, out.reason, out.values = "stopped", error.what, None
         except (ComputationError, InputError) as error:
             out.status, out.reason, out.values = "failed", str(error), None

@@ -52,9 +52,9 @@ from rotfem.refinement.refine import (
     HIGHEST,
     RATIO,
     Clock,
+    OverBudget,
     Refinement,
     Setting,
-    TooDear,
     grown,
     is_known,
     refine,
@@ -275,7 +275,7 @@ class Study:
             refine(first, self._paired, AIM * accuracy, self.clock, found)
         except (ComputationError, InputError) as error:
             self.failures[theory] = str(error)
-        if isinstance(found.failure, TooDear):
+        if isinstance(found.failure, OverBudget):
             self.refused["reference"] = {"setting": {}, "why": found.failure.what, "time": None, "memory": None}
         if found.best is not None and is_known(found.best.error):
             parts = {name: float(found.best.error[name]) for name in ("time", "space") if name in found.best.error}
@@ -310,7 +310,7 @@ class Study:
         """
         found = self.get(setting, "reference")
         if found is None or found.status == "stopped":
-            raise TooDear("the budget is too small for it" if found is None else found.reason)
+            raise OverBudget("the budget is too small for it" if found is None else found.reason)
         if found.values is None:
             raise ComputationError(found.reason)
         return found
@@ -376,9 +376,9 @@ class Study:
         time, memory = known["time"] or 0.0, known["memory"] or 0.0
         try:
             if memory > free:
-                raise TooDear(f"would need about {memory / 1e9:.2g} GB, {free / 1e9:.2g} GB are free")
+                raise OverBudget(f"would need about {memory / 1e9:.2g} GB, {free / 1e9:.2g} GB are free")
             self.clock.begin(setting.words(), len(self.measured) + 1, time / (AIM if self.truth else 1.0))
-        except TooDear as error:
+        except OverBudget as error:
             self.refused.setdefault(setting.key(), {"setting": setting.summary(), "why": error.what, **known})
             return False
         return True
