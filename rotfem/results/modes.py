@@ -243,8 +243,8 @@ class ModesResult(Rows):
         unit = ShownUnits.of(self.summary).frequency
         first = unit if unit != "Hz" else "rad/s"  # there is a column of Hz in any case
         rows = self.rows
-        known = [row.get("mesh_error") if row["error_bound"] < 1.0 else None for row in rows]
-        errors = [None if e is None else e + row["error_bound"] for e, row in zip(known, rows, strict=True)]
+        errors = [None if (e := row.get("mesh_error")) is None else e + row["error_bound"] for row in rows]
+        errors = [e if row["stability"] != "unresolved" else None for e, row in zip(errors, rows, strict=True)]
         columns = [
             [str(row["mode"]) for row in rows],
             [row["name"] for row in rows],
