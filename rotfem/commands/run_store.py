@@ -39,8 +39,8 @@ Tree = dict[str, Any]
 #: Seconds after which ranks tell each other of signals: mpirun gives its processes a quarter of a second.
 TALK = 0.05
 
-#: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observers", "_linearised", "_about")
+#: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 APART = {
     "Log": ("started", "elapsed", "advice"),
     "Monitor": ("system", "critical", "farthest"),
@@ -48,7 +48,7 @@ APART = {
     "StationRows": ("output", "names", "_stations", "_columns"),
     "ResultantRows": ("names", "frames", "_resultants", "_nodes", "_columns", "_stress"),
     "Stepper": _STEPPER,
-    "FollowingStepper": (*_STEPPER, "followed", "carried", "_there", "_curves"),
+    "CompanionStepper": _STEPPER,
     "Companion": ("system", "followed", "output", "interval", "stepper", "further", "_step"),
 }
 

@@ -7,7 +7,7 @@ max(2, k).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,6 @@ import numpy.typing as npt
 import scipy.sparse
 from dolfinx import geometry
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
@@ -112,41 +111,6 @@ def lengths(there: Sequence[npt.ArrayLike], here: Sequence[npt.ArrayLike]) -> Ar
         middle = (a[1:] + a[:-1]) / 2
         ratios.append(np.diff(b)[np.searchsorted(b, middle) - 1] / np.diff(a))
     return np.concatenate(ratios)
-
-
-# --- shapes carried from one mesh to another -------------------------------------------------------------------------
-
-
-def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
-    """Return the interpolation of local dof arrays of one system on the mesh of another; None where there is none.
-
-    Args:
-        of: system of the arrays.
-        to: system of the same structure on another mesh, or on the same.
-    """
-    if of.comm.size > 1:
-        same = of.model.problem.mesh == to.model.problem.mesh
-        return (lambda q: q) if same else None
-    here, there = of.held, to.held
-    nodes = there.V.tabulate_dof_coordinates()
-    if nodes.shape == (known := here.V.tabulate_dof_coordinates()).shape and np.array_equal(nodes, known):
-        return lambda q: q
-    weights = interpolation(here.V, nodes)
-    if weights is None:
-        return None
-    further = len(of.zeros()) - len(here.zeros())  # the angle of a free hub
-    carrying = scipy.sparse.kron(weights, np.eye(here.structure.size))
-    carrying = scipy.sparse.block_diag((carrying, np.eye(further))).tocsr() if further else carrying.tocsr()
-    csr = (carrying.indptr, carrying.indices, carrying.data)
-    A = PETSc.Mat().createAIJ(carrying.shape, csr=csr, comm=MPI.COMM_SELF)  # its products begin sooner than SciPy's
-    known, found = A.createVecs()
-
-    def carried(q: Array) -> Array:
-        known.array[:] = q
-        A.mult(known, found)
-        return np.array(found.array)
-
-    return carried
 
 
 def interpolation(V: Any, points: Array) -> Any:

@@ -1,8 +1,7 @@
 """Companions of a march: the same problem in steps of twice the length, on a coarser mesh, or in a richer theory.
 
 A companion is a second march in lockstep, on a system of its own. It takes two steps of the followed march as one if
-no knot lies between them, or the same steps as another companion. Newton's method starts from the followed motion plus
-the difference so far, and mostly needs one iteration.
+no knot lies between them, or the same steps as another companion.
 
 An error follows from a difference by the order of the elements, or by that of the scheme up to `CERTAIN`
 (`rotfem.refinement.estimate`). For schemes of higher order it is the difference itself.
@@ -19,9 +18,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.dense_output import between, polynomial
+from rotfem.analysis.dense_output import between
 from rotfem.analysis.march import started, travel
-from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_grid import Leg
 from rotfem.equations.compiled import compile_system
@@ -29,7 +28,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import carrier, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.distance import Output, tip
 from rotfem.refinement.estimate import error_of
 
@@ -60,71 +59,11 @@ class Followed:
         return between(old, new, [t], order, comm)[0] if t < new.t else new
 
 
-class FollowingStepper(Stepper):
-    """Stepper whose prediction is the followed motion plus the difference so far.
-
-    Attributes:
-        followed: steps of the followed march; None where they give no prediction.
-        carried: interpolates q of the followed march on the own mesh; None where that is not possible.
-        differences: (t, difference of q) at the ends of the last two steps, s.
-    """
-
-    def __init__(self, system: Any, scheme: Scheme, newton: Newton, carried: Callable[[Array], Array] | None):
-        super().__init__(system, scheme, newton)
-        self.followed: Followed | None = None
-        self.carried = carried
-        self.differences: list[tuple[float, Array]] = []
-        #: q followed, carried to its own mesh, at the end of the step.
-        self._there: Array | None = None
-        #: Polynomials of the steps that are followed, by the time at their end.
-        self._curves: dict[float, Array] = {}
+class CompanionStepper(Stepper):
+    """Stepper of a companion, which is to gain the energy that the march it follows gains."""
 
     def _gains_energy(self, new: State, state: State) -> bool:
         return False
-
-    def predicted(self, stage: Stage, state: State) -> Array:
-        """Return the followed q plus the difference, extrapolated linearly from the last two steps."""
-        step = self.followed
-        if step is None or self.carried is None or state.reference is not step.end.reference:
-            return super().predicted(stage, state)
-        there = self._there if stage.t >= step.end.t else None
-        t, difference = self.differences[-1]
-        guess = np.add(self.carried(self._followed_at(stage.t, step)) if there is None else there, difference)
-        if len(self.differences) > 1:
-            before, other = self.differences[0]
-            guess += (stage.t - t) / (t - before) * (difference - other)
-        clamped = self.system.held.clamped
-        guess[clamped] = stage.q[clamped]  # no iteration corrects the round-off of interpolation there
-        return guess
-
-    def _followed_at(self, t: float, step: Followed) -> Array:
-        """Return q of the followed march at a time (s) within a step."""
-        old, new = next((pair for pair in step.steps if t <= pair[1].t), step.steps[-1])
-        if not old.t < t < new.t:
-            return old.q if t <= old.t else new.q
-        if new.t not in self._curves:
-            self._curves[new.t] = polynomial(old, new, self.scheme.order, self.system.comm)
-        curve, share = self._curves[new.t], (t - old.t) / (new.t - old.t)
-        return np.asarray(share ** np.arange(len(curve)) @ curve)
-
-    def follow(self, step: Followed, state: State) -> None:
-        """Prepare the predictions of a step from a state."""
-        self.followed, self._there, self._curves = None, None, {}
-        if self.system.solved_at_once or self.carried is None:
-            return
-        if any(s.reference is not state.reference for pair in step.steps for s in pair):
-            self.differences = []
-            return
-        self.followed, self._there = step, self.carried(step.end.q)
-        if not self.differences:
-            self.differences = [(state.t, state.q - self.carried(step.steps[0][0].q))]
-
-    def arrived(self, state: State) -> None:
-        """Record the difference at the end of the followed step."""
-        if self.followed is None or self._there is None or state.reference is not self.followed.end.reference:
-            self.differences = []
-        else:
-            self.differences = [*self.differences[-1:], (state.t, state.q - self._there)]
 
 
 class Companion:
@@ -171,7 +110,7 @@ class Companion:
         self.interval = interval
         system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
-        self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
+        self.stepper = CompanionStepper(system, scheme, own)
         self.stepper.observers.append(self._arrived)
         self.further = list(further)
         self.state: State | None = None
@@ -229,7 +168,6 @@ class Companion:
     def _arrived(self, old: State, new: State, leg: Leg) -> None:
         """Compare the outputs at the end of a step and within it, and pass it on."""
         step = self._step
-        self.stepper.arrived(new)
         before, self.last = self.last, self._compare(new, step.end)
         self.path += (way := dist(before, self.last))
         self.doubled += way if len(step.steps) > 1 else 0.0
@@ -253,7 +191,6 @@ class Companion:
             self.sound = False
             return
         stepper, start = self.stepper, self.state
-        stepper.follow(step, start)
         self._step = step
         try:
             if start.t == 0.0:

@@ -20,7 +20,7 @@ from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.refinement.distance import distance
-from rotfem.refinement.explain import HISTORY, MODES, NOTICEABLE, STEADY
+from rotfem.refinement.explain import HISTORY, MODES, NOTICEABLE, RESOLVED, STEADY
 from rotfem.registry import register
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
@@ -177,7 +177,7 @@ def test_without_speed_coriolis_and_centrifugal_forces_change_nothing() -> None:
     loads = {"tip_force": [[0.0, 0.0, 0.0], [0.5, 0.0, 5.0]]}
     rows = rows_of({"structure": STRUCTURE, "motion": motion, "loads": loads, "time": {"end": 1.0, "step": 0.02}})
     for name in ("coriolis", "centrifugal", "euler"):
-        assert rows[name]["estimate"][HISTORY] < 1e-9  # where Newton's method stops
+        assert rows[name]["estimate"][HISTORY] < RESOLVED  # where increments of Newton's method end
         assert rows[name]["estimate"][MODES] == 0.0
         assert rows[name]["verdict"] == "negligible"
     assert rows["rotary_inertia"]["worst"] > 0.0
