@@ -75,11 +75,12 @@ def steady_state(
             return balance(system, growth, 1.0, system.zeros(), newton)
         return _grown(system, growth, newton, past_limits, notes)
     except ComputationError as error:
-        if not (loose or system.linear) and _compliance_lost(system, omega):
-            lost = "round-off decides, as axial or shear stiffness outweighs what bends beyond its digits"
+        lost = not system.linear and _compliance_lost(system, growth)
+        if lost and not loose:
+            why = "round-off decides, as axial or shear stiffness outweighs what bends beyond its digits"
             advice = "stiffnesses closer to each other, or fewer elements"
-            raise ComputationError(f"{error.what}; {lost}", error.time, advice) from error
-        if not loose or growth.start is not None:
+            raise ComputationError(f"{error.what}; {why}", error.time, advice) from error
+        if not (loose and (lost or growth.start is None)):
             raise
         raise ComputationError(
             f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {omega:g} rad/s: "
@@ -88,11 +89,11 @@ def steady_state(
         ) from error
 
 
-def _compliance_lost(system: Any, omega: float) -> bool:
-    """Return whether round-off of the stiffness is all of what the load does to the structure at rest."""
-    system.count_rotations_from(None)
-    system.set_time(0.0, system.motion.at_speed(omega))
-    system.set_state(system.zeros())
+def _compliance_lost(system: Any, growth: LoadFactors) -> bool:
+    """Return whether round-off of the stiffness is all of what the load does to the structure before it grows."""
+    q = growth.begin(system)
+    growth.set(system, 1.0)
+    system.set_state(q)
     K, load = system.matrix(1.0, 0.0, 0.0, 1.0), system.residual()
     try:
         return rounded_compliance(system, K, Increment(system.V).solve(DirectSolver(K), load).copy()) >= KNOWN

@@ -73,7 +73,7 @@ class FirstMotion:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
         """
         number, system = self.mode or 1, analysis.system.held
-        analysis.check_count(number)
+        analysis.check_count(number, "initial.mode")
         spinning = analysis.at(system.motion.speed(0.0), number)
         if len(spinning.pairs.values) < number:
             raise InputError("initial.mode", number, f"there are {len(spinning.pairs.values)} modes")

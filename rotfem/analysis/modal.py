@@ -209,8 +209,8 @@ class ModalAnalysis:
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
 
-    def check_count(self, count: int) -> None:
-        """Refuse more modes than there are unknowns.
+    def check_count(self, count: int, key: str = "modes.count") -> None:
+        """Refuse more modes than there are unknowns, which a key of the scene asks for.
 
         Raises:
             InputError: says how many there are.
@@ -218,7 +218,7 @@ class ModalAnalysis:
         allowed = self.structure.free_unknowns() + int(self.free)
         if count > allowed:
             why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
-            raise InputError("modes.count", count, why)
+            raise InputError(key, count, why)
 
     def at(
         self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None

@@ -178,3 +178,9 @@ def test_refused(initial: Any, more: Any, words: str) -> None:
     with pytest.raises(rotfem.SceneError, match="initial") as caught:
         rotfem.Scene.from_dict(scene(initial, **more))
     assert words in str(caught.value)
+
+
+def test_a_mode_that_there_is_not() -> None:
+    tables = scene({"mode": 99, "amplitude": 0.1}, mesh={"elements": 1})
+    with pytest.raises(rotfem.InputError, match="initial.mode = 99: must be at most"):
+        rotfem.run(tables)
