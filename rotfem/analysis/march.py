@@ -332,8 +332,8 @@ class ErrorMeasure:
         return 2.0 * max(self.end / h * adds_up, remains)
 
     def size(self, x: Array) -> float:
-        """Return the largest displacement of a local dof array, in units of their scale."""
-        return float(self.inner.sizes(x)[self.inner.structure.moves].max())
+        """Return the largest displacement of points of the sections in a local dof array, over the length."""
+        return float(self.inner.displaced(x).max() / self.inner.structure.length)
 
     def displacement(self, state: State) -> float:
         """Return the largest displacement of a state relative to the turning frame, in units of its scale."""

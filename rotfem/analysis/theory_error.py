@@ -139,8 +139,6 @@ def error_of_state(
         exact = system.model.theory.exact
         return TheoryError(0.0, "its strains are exact" if exact else "there is none to compare it with", name)
     displacement, rotation = _sizes(system, q)
-    if displacement == 0.0:
-        return TheoryError(rotation / 2, f"the largest rotation is {rotation:.2g}", name)
     tips = np.abs(_tip(system, q)) if tips is None else tips
     moves, neglected = system.structure.moves, max(displacement, rotation) / 2
     largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
@@ -203,9 +201,9 @@ def _tip(system: Any, x: Array) -> Array:
 
 
 def _sizes(system: Any, q: Array) -> tuple[float, float]:
-    """Return the size of displacements over L, and the largest rotation component (rad)."""
-    sizes, moves = np.asarray(system.sizes(q)), system.structure.moves
-    return float(np.linalg.norm(sizes[moves])), float(np.max(sizes[~moves], initial=0.0))
+    """Return the size of displacements of sections' points over L, and the largest rotation component (rad)."""
+    rotations = system.sizes(q)[~system.structure.moves]
+    return float(np.linalg.norm(system.displaced(q))) / system.structure.length, float(np.max(rotations, initial=0.0))
 
 
 def _correction(system: Any, q: Array, time: float = np.inf, first: Array | None = None) -> Array:

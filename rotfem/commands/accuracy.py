@@ -253,9 +253,7 @@ def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Miss
         "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }[worst]
     unknown = [WORDS[name] for name in WORDS if error.get(name, 0.0) is None]
-    if error.get("scale") == 0.0:
-        reached, advice = "the tip is not displaced", 'accuracy_of = "root_moment"'
-    elif unknown or error["total"] is None:
+    if unknown or error["total"] is None:
         reached = f"the error of what was reached is not known ({', '.join(unknown)})"
     else:
         share = contribution(error, worst)

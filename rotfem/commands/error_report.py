@@ -24,7 +24,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import HistoryErrors, richer_problem
-from rotfem.refinement.distance import COLUMNS, OUTPUTS, Output, largest, sizes, tip
+from rotfem.refinement.distance import OUTPUTS, Output, largest, of_columns, sizes, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
 from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
@@ -72,29 +72,20 @@ class RunErrors:
     @property
     def _scale(self) -> float:
         """Largest displacement of the tip, m."""
-        return largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS["tip"])]))
-
-    @property
-    def _turn(self) -> float:
-        """Largest component of the rotation of the tip, rad."""
-        rotations = np.array(self.system.structure.components)[~self.system.structure.moves]
-        return max((float(np.max(np.abs(self.history[f"tip_{name}"]))) for name in rotations), default=0.0)
+        return largest(of_columns("tip", self.history, self.system.structure))
 
     def estimate(self) -> ErrorEstimate | None:
         """Return the error, relative to the largest value of its output; None if not wanted, or nothing was computed.
 
-        The output is the displacement of the tip, or what `accuracy_of` names. Unknown is that of a displacement which
-        is round-off of rotations; `scale` is 0 then.
+        The output is the displacement of the tip, or what `accuracy_of` names.
         """
         if not self.wanted or not len(self.history["t"]):
             return None
         of = output_of(self.scene)
-        scale = largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS[of])]))
+        scale = largest(of_columns(of, self.history, self.system.structure))
         contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
-        if of == "tip" and scale < RESOLVED * self._turn * self.system.structure.length:
-            found["scale"] = 0.0
-        elif self.companions is not None:
+        if self.companions is not None:
             contributions = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
         elif self.reduced is not None or self.shape is not None:
@@ -110,7 +101,7 @@ class RunErrors:
             return TheoryError(self.reduced.foreshortening, basis, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
-        names, moves = self.system.structure.components, self.system.structure.moves
+        names = self.system.structure.components
         tips = np.array([np.max(np.abs(self.history[f"tip_{name}"])) for name in names])
         in_balance = self.scene.time is not None and self.scene.initial.first is None
         richer = richer_problem(self.problem)
@@ -129,9 +120,9 @@ class RunErrors:
         base = self.monitor.farthest.error(system, tips, in_balance)
         if base is None:
             return None
-        sizes = tips[moves]
+        sizes = tips * self.system.structure.lever
         resolved = sizes > RESOLVED * np.max(sizes, initial=0.0)
-        each = zip(np.array(names)[moves], components, sizes, resolved, strict=True)
+        each = zip(names, components, sizes, resolved, strict=True)
         own = {f"tip_{name}": d / size for name, d, size, known in each if known}
         return base.of_poorer(self.problem.theory, apart, own)
 
@@ -187,7 +178,7 @@ class RunErrors:
         if own is not None:
             accuracy, bent = accuracy_of(self.scene), own.manifold is not None
             there = own if same else reduced_response(system, own.times, self.start(system).q, accuracy, bent)
-            return there.tips[:, system.structure.moves]
+            return np.asarray(there.tips * system.structure.lever)
         solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
         if same and self.shape is not None:
             q = self.shape.copy()
@@ -249,8 +240,6 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        if error.found["scale"] == 0.0:
-            return 'the tip is not displaced; accuracy_of = "root_moment" has that of the moment'
         if self.companions is not None and error.contributions["time"] is None:
             if self.companions.steps.sound:
                 return "the prescribed motion or loads allow no steps of twice the length"

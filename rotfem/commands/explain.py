@@ -27,7 +27,7 @@ from rotfem.mechanics.theories import Theory
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.distance import distance, distance_each
+from rotfem.refinement.distance import distance, distance_each, of_columns
 from rotfem.refinement.explain import MODES, RESOLVED, Case, Change, Explanation
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
@@ -220,7 +220,7 @@ def full_outputs(scene: Scene, of: Explanation) -> tuple[dict[str, Any], dict[st
                 out[name] = np.array([complex(row["growth"], row["frequency"]) for row in kept])
             else:
                 history = run(scene, comm=comm).history
-                out[name] = np.column_stack([x for key, x in history.items() if key.startswith("tip_u")])
+                out[name] = of_columns("tip", history, of.system.structure)
         except ComputationError as error:
             out[name], notes[name] = None, error.what
     return out, notes
@@ -256,9 +256,8 @@ def groups(of: Explanation) -> dict[str, float]:
     first = float(at_rest[0]) if at_rest.size else 0.0
     speeds, rates = _turning(case, system)
     out = {"speed_ratio": float(np.abs(speeds).max()) / first} if first > 0.0 else {}
-    radius = _radius(structure)
-    if radius is not None and radius > 0.0:
-        out["slenderness"] = length / radius
+    if system.structure.radius > 0.0:
+        out["slenderness"] = length / system.structure.radius
     if of.size > 0.0:
         out |= {"deflection": of.scale / length, "rotation": of.size}
     root = getattr(structure, "root_position", structure.hub_radius)
@@ -294,20 +293,6 @@ def _turning(case: Case, system: Any) -> tuple[Array, Array]:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
     speeds = motion.hub.rigid_speeds(np.asarray(times), system.row.rest_inertia())
     return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
-
-
-def _radius(structure: Any) -> float | None:
-    """Return √(EI/EA) at the clamp, the least of its bending stiffnesses (m); None where there is no such section."""
-    section = getattr(structure, "section", None)
-    if section is None:
-        thickness = structure.thickness
-        return float(thickness) / np.sqrt(12) if isinstance(thickness, int | float) else None
-    at = section.at(np.zeros(1))
-    bending = [at[name] for name in ("EI", "EI2", "EI3") if name in at]
-    if "stiffness" in at:
-        C = np.asarray(at["stiffness"]).reshape(-1, 6, 6)[0]
-        return float(np.sqrt(min(C[4, 4], C[5, 5]) / C[0, 0]))
-    return float(np.sqrt(min(float(b[0]) for b in bending) / float(at["EA"][0]))) if bending else None
 
 
 def _added_mass(system: Any, effect: str) -> float:

@@ -355,6 +355,14 @@ class System(Solutions, ABC):
             self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
         return np.asarray(here)
 
+    def displaced(self, x: Array) -> Array:
+        """Return the largest displacement by each component (m), by a rotation that of a section's points at `radius`.
+
+        Shape (components,), over all ranks; see `rotfem.structures.structure.Structure`.
+        """
+        s = self.structure
+        return np.asarray(self.sizes(x) * np.where(s.moves, s.length, s.radius))
+
     def tip(self, q: Array, t: float) -> Array:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
         tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))

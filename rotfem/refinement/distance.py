@@ -1,8 +1,12 @@
-"""Outputs of answers, and the distance of two answers in them."""
+"""Outputs of answers, and the distance of two answers in them.
+
+The tip is a section, whose points are displaced by u + θ × d, d their distance from its axis. With d a radius of
+gyration r, the output is (u, r θ): a rotation counts by what it displaces, and where there is nothing else it is all.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +19,9 @@ Output = Callable[[Any, State], Array]
 
 
 def tip(system: Any, state: State) -> Array:
-    """Return the displacement of the tip in the frame that turns with the hub, m."""
+    """Return the displacement of the tip in the frame that turns with the hub, and its rotation times a radius, m."""
     system.count_rotations_from(state.reference)
-    return np.asarray(system.tip(state.q, state.t)[system.structure.moves])
+    return np.asarray(system.tip(state.q, state.t) * system.structure.lever)
 
 
 def root_moment(system: Any, state: State) -> Array:
@@ -28,9 +32,15 @@ def root_moment(system: Any, state: State) -> Array:
     return np.array([value for name, value in system.root_reaction().items() if name.startswith("m")])
 
 
-#: Outputs by their names in `accuracy_of`, and the prefix of their columns of a history.
+#: Outputs by their names in `accuracy_of`.
 OUTPUTS: dict[str, Output] = {"tip": tip, "root_moment": root_moment}
-COLUMNS = {"tip": "tip_u", "root_moment": "root_m"}
+
+
+def of_columns(name: str, history: Mapping[str, Array], structure: Any) -> Array:
+    """Return an output (n, components) by its name, from the columns of a history."""
+    if name == "tip":
+        return np.asarray(np.column_stack([history[f"tip_{c}"] for c in structure.components]) * structure.lever)
+    return np.column_stack([x for column, x in history.items() if column.startswith("root_m")])
 
 
 def distance(one: Array, other: Array) -> float:

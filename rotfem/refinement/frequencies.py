@@ -174,5 +174,5 @@ def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time:
     lasting = np.minimum(time, 1.0 / np.maximum(-lam.real, 1.0 / time))
     out = np.abs(part) * np.minimum(change * lasting, 2.0)  # which is out of phase
     tip = tip_output(system).read
-    lengths = [np.linalg.norm(tip(x, 0.0)[system.structure.moves]) for x in pairs.right.T]
+    lengths = [np.linalg.norm(tip(x, 0.0) * system.structure.lever) for x in pairs.right.T]
     return float(np.sum(out * lengths, where=lam.imag > 0.0) * 2.0)  # with the conjugate pairs

@@ -134,13 +134,10 @@ class Setting:
         """Return the next setting after an answer that missed the accuracy; None where nothing is left to refine.
 
         Args:
-            error: `time`, `space` and `model` of the answer, as far as it has them, None where unknown; and `scale`, 0
-                where the output is round-off.
+            error: `time`, `space` and `model` of the answer, as far as it has them, None where unknown.
             accuracy: wanted.
         """
         allowed, new = (accuracy - contribution(error, "round_off")) / SAFETY, self
-        if error.get("scale") == 0.0:
-            return None
         if contribution(error, "model") > AIM * allowed:
             richer = self.richer()
             if richer is not None:

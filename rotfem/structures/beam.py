@@ -46,6 +46,7 @@ class Beam(Structure):
         grid, s = problem.mesh, self.data
         root = getattr(s, "root_position", (s.hub_radius, 0.0, 0.0))
         self.length, self.hub_radius, self._section = s.length, root[0], s.section
+        self.radius = self._radius()
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
         places = apart((*nodes, *problem.loads.jumps), self.length)
@@ -76,6 +77,14 @@ class Beam(Structure):
         self.tip, self.root = (ufl.ds(tag, domain=self.mesh, subdomain_data=at) for tag in (1, 2))
         self.clamped = fem.locate_dofs_topological(self.V, 0, facets[1])
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
+
+    def _radius(self) -> float:
+        """Return √(EI/EA) at the clamp, of the least of the bending stiffnesses, m."""
+        at = self._section.at(np.zeros(1))
+        if "stiffness" in at:
+            C = np.diag(np.asarray(at["stiffness"]).reshape(6, 6))
+            return float(np.sqrt(min(C[4], C[5]) / C[0]))
+        return float(np.sqrt(at["EI"][0] / at["EA"][0]))
 
     def root_turn(self, axis: int) -> Any:
         """Return the rotation at the root about an axis, 1 to 3, of the blade there: an expression, rad."""

@@ -178,6 +178,8 @@ class Plate(Structure):
         self.clamped = fem.locate_dofs_topological(self.V, 1, self.grid.edges("clamped"))
         low, high = self._box()
         self.length = float(np.max(high - low))
+        thick = np.max([*s.thickness.values()] if isinstance(s.thickness, dict) else s.thickness_at(0.0))
+        self.radius = float(thick) / math.sqrt(12.0)
         self._has_tip = "tip" in self.grid.curve_names
         self.root = self.grid.along("clamped")
         self.tip = self.grid.along("tip") if self._has_tip else None

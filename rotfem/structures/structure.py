@@ -165,6 +165,8 @@ class Structure:
     clamped: npt.NDArray[np.int32]
     tip_values: TipValues
     length: float
+    #: Radius of gyration of the section at the clamp, √(EI/EA) (m); 0 where there is none.
+    radius: float = 0.0
 
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
@@ -204,6 +206,11 @@ class Structure:
     def moves(self) -> npt.NDArray[np.bool_]:
         """Of every component whether it is a displacement; the others are rotations."""
         return np.array([name.startswith("u") for name in self.components])
+
+    @cached_property
+    def lever(self) -> Array:
+        """Factors that make components displacements of a section's points (m): 1, of rotations `radius`."""
+        return np.where(self.moves, 1.0, self.radius)
 
     @property
     def unknowns(self) -> tuple[str, ...]:

@@ -103,7 +103,6 @@ def test_the_largest_contribution_is_refined_by_its_order() -> None:
     poor = Setting((LINEAR, FULL), 6, 3, "esdirk4", 1e-2)
     assert poor.finer({"model": 0.5, "total": 0.5}, 1e-3) == SETTING
     assert SETTING.finer({"model": 0.5, "total": 0.5}, 1e-3) is None
-    assert SETTING.finer({"time": None, "space": None, "scale": 0.0}, 1e-3) is None  # round-off is refined by nothing
     far = SETTING.finer({"time": 1e9, "space": 1e9, "total": 2e9}, 1e-3)
     assert far is not None
     assert (far.elements, far.tolerance) == (8 * SETTING.elements, SETTING.tolerance / 8**4)

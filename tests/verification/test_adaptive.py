@@ -142,8 +142,8 @@ def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> 
 
     After some 200 of them the switch would be recognised.
     """
-    monkeypatch.setattr("rotfem.analysis.march.PACE", 50)
-    monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 1000)
+    monkeypatch.setattr("rotfem.analysis.march.PACE", 25)
+    monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 500)
     switch = {
         "type": "torque",
         "hub_inertia": 50.0,

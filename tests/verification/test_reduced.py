@@ -147,7 +147,11 @@ def test_a_basis_of_all_unknowns_is_the_full_system(spin_up: MakeScene) -> None:
 
 
 def test_a_small_motion_beside_one_of_much_energy() -> None:
-    """A torsion of 0.9 rad, which moves no tip, has 1e6 times the energy of a lateral pulse; motions add up."""
+    """A torsion of 0.9 rad has 1e6 times the energy of a lateral pulse, and motions add up.
+
+    The accuracy is that of a section's points, which torsion moves by 250 times as much. A quarter of the lateral
+    motion would be 0.1 of it; without shapes that move the axis at the tip all of that motion is lost.
+    """
     section = {"EA": 2e7, "GA2": 6e6, "GA3": 6e6, "GJ": 800.0, "EI2": 1e4, "EI3": 4e4, "mass_per_length": 1.5}
     section |= {"rotary_inertia2": 7.5e-4, "rotary_inertia3": 3e-3}
     pulse = {"at": [{"x": 5.0, "force": {"table": [[0, 0, 0, 0], [0.01, 0, 0, 0.2], [0.02, 0, 0, 0]]}}]}
@@ -162,7 +166,7 @@ def test_a_small_motion_beside_one_of_much_energy() -> None:
         run(Scene.from_dict(tables | {"loads": loads, "model": {"theory": "consistent_linear", "reduced": accuracy}}))
         for loads, accuracy in ((pulse | {"tip_moment": [40.0, 0.0, 0.0]}, 1e-2), (pulse, 1e-4))
     )
-    assert difference(both.history, alone.history, "tip_u3") < 1e-2
+    assert difference(both.history, alone.history, "tip_u3") < 0.25
     assert "reduced" in both.summary
 
 

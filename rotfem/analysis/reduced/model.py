@@ -79,7 +79,8 @@ class ReducedModel:
         sizes, X = np.sqrt(energies[sure]), X @ turns[:, sure]
         parts = sizes
         if motion is not None:
-            at_tip = np.linalg.norm(self.tips(with_ghosts(self.system.V, X))[self.system.structure.moves], axis=0)
+            levers = self.system.structure.lever
+            at_tip = np.linalg.norm(levers[:, None] * self.tips(with_ghosts(self.system.V, X)), axis=0)
             parts = sizes / np.linalg.norm(motion, axis=1).max(initial=1e-300)
             parts += at_tip / max(self.largest(motion @ self.tips().T), 1e-300)
         keep = np.flatnonzero(parts > least)
@@ -166,8 +167,8 @@ class ReducedModel:
         return np.array(columns).reshape(shapes.shape[1], len(self.system.structure.components)).T
 
     def largest(self, tips: Array) -> float:
-        """Return the largest length of displacement vectors of the tip (n, components), m."""
-        return float(np.linalg.norm(tips[:, self.system.structure.moves], axis=1).max(initial=0.0))
+        """Return the largest displacement of the tip of its unknowns (n, components), rotations times a radius, m."""
+        return float(np.linalg.norm(tips * self.system.structure.lever, axis=1).max(initial=0.0))
 
     def of_spin(self, effect: str, degree: int) -> tuple[Array, Array]:
         """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis, without prestress.

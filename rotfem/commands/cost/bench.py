@@ -30,7 +30,7 @@ from rotfem.commands.run_store import RunStore
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.listeners import cpu_time
 from rotfem.refinement.coarser import lines
-from rotfem.refinement.distance import COLUMNS
+from rotfem.refinement.distance import of_columns
 from rotfem.refinement.refine import Clock, OverBudget, Setting
 from rotfem.results.files import opened, writing
 from rotfem.scene import Scene
@@ -178,10 +178,9 @@ class Bench:
 
         def go() -> Output:
             result = simulation.run()
-            columns = [x for name, x in result.history.items() if name.startswith(COLUMNS["tip"])]
-            s = result.summary
+            tips, s = of_columns("tip", result.history, simulation.system.structure), result.summary
             counts = s["dofs"], s["steps"], s["newton_iterations"]
-            return np.column_stack(columns), counts, lines(simulation.system)
+            return tips, counts, lines(simulation.system)
 
         return go
 
