@@ -188,8 +188,6 @@ class KeptDigits:
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
         if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
             return pairs
-        if self._in_damping(pairs, count) > 0.1:  # nothing is gained
-            return pairs
         kept, stressed = self._resultants.at_state(pencil.M, pencil.C, pencil.unit or 1.0)
         try:
             found = kept.solve(count)
@@ -215,14 +213,6 @@ class KeptDigits:
             return pairs
         pencil.spectrum_error, self.used = kept.spectrum_error, True
         return Eigenpairs(found.values, right, left, found.errors, bounds)
-
-    def _in_damping(self, pairs: Eigenpairs, count: int) -> float:
-        """Return what the viscosity of the stiff strains, which is summed as before, would leave of the bounds."""
-        eta = self.system.model.mechanics.damping.stiffness
-        if eta is None:
-            return 0.0
-        bounds = np.maximum(pairs.bounds, pairs.bounds**2)[:count]
-        return float(np.max(float(eta.value) * np.abs(pairs.values[:count]) * bounds, initial=0.0))
 
 
 def _digits(bounds: Array) -> float:

@@ -18,17 +18,16 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 import ufl
-from petsc4py import PETSc
 
 from rotfem.equations.nonlinear import BySpin, assembled
-from rotfem.equations.solutions import BorderedLinearised
+from rotfem.equations.solutions import Linearised
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, weighted
 from rotfem.numerics.linear import Increment
-from rotfem.numerics.projection import PlusLowRank
+from rotfem.numerics.projection import bordered
 from rotfem.structures.root_reaction import along_axis
 
 
@@ -262,9 +261,14 @@ class BorderedSystem:
         """Return the owned part of −F at the state, and that of the hub."""
         return np.append(self.inner.imbalance(), -self.row.residual(self.inner.time))
 
-    def linearised(self) -> BorderedLinearised:
+    def linearised(self) -> Linearised:
         """Return the equations linearised about the state and time set."""
-        return BorderedLinearised(self)
+        return Linearised(self)
+
+    def local(self, x: Array) -> Array:
+        """Return the local dof array of an owned one, the angle last, which the last process has."""
+        comm, n = self.inner.comm, len(self.inner.root.weights)
+        return np.append(self.inner.local(x[:n]), comm.bcast(x[n:], comm.size - 1) if comm.size > 1 else x[n:])
 
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""
@@ -348,30 +352,3 @@ class OverStep(BorderedSystem):
 
     def finish(self, stage: Any) -> None:
         """Return what the next step is to know of one that is solved: nothing."""
-
-
-def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
-    """Return [[A, column], [row, corner]] as a new matrix of the kind of A; the last rank holds the new row.
-
-    Args:
-        A: square PETSc matrix, or `PlusLowRank`.
-        row: owned part of the new row.
-        column: owned part of the new column.
-        corner: the last diagonal entry.
-    """
-    if isinstance(A, PlusLowRank):
-        return PlusLowRank(bordered(A.sparse, row, column, corner), A.part.bordered(), A.factor)
-    comm = A.comm.tompi4py()
-    size, last = A.getSize()[0], comm.rank == comm.size - 1
-    indptr, indices, data = A.getValuesCSR()
-    ends = indptr[1:]
-    data, indices = np.insert(data, ends, column), np.insert(indices, ends, size)
-    indptr = indptr + np.arange(len(indptr), dtype=indptr.dtype)
-    whole = np.concatenate(comm.allgather(row))
-    if last:
-        data = np.concatenate([data, whole, [corner]])
-        indices = np.concatenate([indices, np.arange(size + 1)]).astype(indptr.dtype)
-        indptr = np.append(indptr, indptr[-1] + size + 1).astype(indptr.dtype)
-    local = len(row) + int(last)
-    shape = ((local, size + 1), (local, size + 1))
-    return PETSc.Mat().createAIJ(shape, csr=(indptr, indices.astype(indptr.dtype), data), comm=A.comm)

@@ -10,9 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from rotfem.errors import ComputationError
 from rotfem.numerics.linear import ComplexSolver, DirectSolver, Increment, SingularSolver, combine, is_regular
-from rotfem.numerics.projection import summed, with_ghosts
 
 Array = npt.NDArray[Any]
 
@@ -155,13 +153,12 @@ class Linearised:
 
     def __init__(self, system: Any):
         self.system, self.reference, self.serves = system, system.reference, True
-        self._matrices = tuple(reversed(system.held.mass_damping_stiffness()))
+        self._matrices = tuple(reversed(system.with_hub(system.held.mass_damping_stiffness())))
         self._shift: float | None = None
-        self._part = Increment(system.held.V)
         self._real_matrix = self._matrices[0].duplicate()
         self._real = DirectSolver(self._real_matrix)
         self._complex = ComplexSolver(self._matrices)
-        self._b = self._real_matrix.createVecLeft()
+        self._x, self._b = self._real_matrix.createVecs()
 
     def take(self, shifts: tuple[float, complex]) -> None:
         """Factorise with a real and a complex s (1/s), unless the factors at hand are those."""
@@ -174,44 +171,7 @@ class Linearised:
 
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
-        self._b.array[:] = real
-        found = with_ghosts(self.system.held.V, self._complex.solve(complex_))
-        return self._part.solve(self._real, self._b).copy(), found
-
-
-class BorderedLinearised(Linearised):
-    """Those of a structure with the angle of its hub as last unknown, eliminated as in `BorderedSystem`."""
-
-    def __init__(self, system: Any):
-        super().__init__(system)
-        row, inner = system.row, system.held
-        unit = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        self._rows = np.array([row.row(shifts).array.copy() for shifts in unit])
-        self._columns = np.array([inner.spin_derivative(c_v, c_m).array.copy() for _, c_v, c_m in unit])
-        self._corners = np.array([row.diagonal(c_v, c_m) for _, c_v, c_m in unit])
-
-    def take(self, shifts: tuple[float, complex]) -> None:
-        """Factorise, and solve for the answer to the angle."""
-        if self._shift == shifts[0]:
-            return
-        super().take(shifts)
-        powers = [np.array([1.0, s, s * s]) for s in shifts]
-        answers = super().solve(*(p @ self._columns for p in powers))
-        self._border = [
-            (z, p @ self._rows, self._corners @ p - self._product(p @ self._rows, z))
-            for p, z in zip(powers, answers, strict=True)
-        ]
-
-    def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
-        """Return the solutions with the angle last."""
-        found = super().solve(real[:-1], complex_[:-1])
-        out = []
-        for y, r, (z, row, corner) in zip(found, (real[-1], complex_[-1]), self._border, strict=True):
-            if corner == 0.0:
-                raise ComputationError("the hub equation is singular")
-            turn = (r - self._product(row, y)) / corner
-            out.append(np.append(y - z * turn, turn))
-        return out[0], out[1]
-
-    def _product(self, row: Array, x: Array) -> Any:
-        return summed(self.system.held.comm, row @ x[: len(row)])
+        rows = len(self._b.array)
+        self._b.array[:] = real[:rows]
+        self._real.solve(self._b, self._x)
+        return self.system.local(self._x.array.copy()), self.system.local(self._complex.solve(complex_[:rows]))

@@ -30,7 +30,7 @@ from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import Assembler, added
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.projection import PlusLowRank, summed
+from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
 from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
@@ -230,6 +230,10 @@ class System(Solutions, ABC):
     def start(self, q: Array) -> tuple[Array, Array]:
         """Return (q, v) at t = 0 of a shape, given in the turning frame, that rests there."""
         return (q, np.zeros_like(q)) if self.clamp is None else self.clamp.rigid(q, 0.0)
+
+    def local(self, x: Array) -> Array:
+        """Return the local dof array of an owned one."""
+        return with_ghosts(self.V, x)
 
     def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
         """Write local dof arrays into the functions q, v, a that the forms are evaluated at; zero where None."""

@@ -3,7 +3,7 @@
 The inertia is how many eigenvalues are negative: as many as pivots of A = L D Lᵀ (Sylvester).
 
 A complex system (A + iB)(x + iy) = f + ig is [[A, −B], [B, A]] (x, y) = (f, g), whose unknowns stand side by side,
-x₁ y₁ x₂ y₂ …, so that the factor fills in as that of A does.
+x₁ y₁ x₂ y₂ …, so that the factor fills in as that of A does: a matrix of blocks [[a, −b], [b, a]].
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import compat
-from rotfem.numerics.projection import PlusLowRank, Update, dense, sparse_part
+from rotfem.numerics.projection import PlusLowRank, Update, dense, sparse_part, written_out
 
 Array = npt.NDArray[np.float64]
 
@@ -79,22 +79,10 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool
     """
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
-    if pivots:
-        pc.setType(PETSc.PC.Type.LU)
-        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-        return
-    if ksp.comm.size > 1 and size <= small:
-        # Every process factors the whole small matrix: far quicker than sharing it out.
-        pc.setType(PETSc.PC.Type.REDUNDANT)
-        options = PETSc.Options()
-        options[f"{ksp.getOptionsPrefix() or ''}redundant_pc_factor_zeropivot"] = 0.0  # as below
-        if not options.hasName("options_left"):  # nothing may be solved with it, of which PETSc would warn at the end
-            options["options_left"] = False
-        ksp.setFromOptions()
-        return
-    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > small else PETSc.PC.Type.LU)
+    large = pivots or size > small or ksp.comm.size > 1
+    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and large and not pivots else PETSc.PC.Type.LU)
     pc.setFactorPivot(0.0)  # what is small depends on the units; a singular matrix is seen in the solution
-    if size > small:
+    if large:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
 
 
@@ -214,16 +202,8 @@ class DirectSolver:
         """
         if self._stale:
             self.factorise()
-        pc = self._ksp.getPC()
-        if pc.getType() not in (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY):  # no factor of its own
-            out, (x, b) = np.empty_like(right), self.A.createVecs()
-            for column, solved in zip(right.T, out.T, strict=True):
-                b.array[:] = column
-                self.solve(b, x)
-                solved[:] = x.array
-            return out
         out = np.empty_like(right, order="F")
-        pc.getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
+        self._ksp.getPC().getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
         return out if self._update is None else self._update(out)
 
     def _apply(self, b: Any, x: Any) -> None:
@@ -350,52 +330,27 @@ class ComplexSolver:
     """LU factorisation of complex sums of real matrices of one pattern.
 
     Args:
-        matrices: assembled PETSc matrices; one may be `PlusLowRank`. Their entries are those of now.
-
-    Attributes:
-        updates: whether solutions are those of another matrix, updated: it must not be singular where the sum is not.
+        matrices: assembled PETSc matrices, whose entries are those of now. All but the first may be `PlusLowRank`; the
+            weight of the first must not be zero then.
     """
 
     def __init__(self, matrices: Sequence[Any]):
-        self._entries = [sparse_part(A).getValuesCSR()[2] for A in matrices]
-        self._added = [(i, A) for i, A in enumerate(matrices) if isinstance(A, PlusLowRank)]
-        self.updates = bool(self._added)
-        pattern = sparse_part(matrices[0])
-        indptr, indices, _ = pattern.getValuesCSR()
-        length = np.diff(indptr)
-        rows = np.repeat(2 * length, 2)
-        self._indptr = np.append(0, np.cumsum(rows)).astype(indptr.dtype)
-        pairs = np.stack([2 * indices, 2 * indices + 1], axis=1)
-        starts = self._indptr[:-1:2]
-        self._upper = (np.repeat(starts - 2 * indptr[:-1], length) + 2 * np.arange(len(indices)))[:, None] + np.arange(
-            2
-        )
-        self._lower = self._upper + np.repeat(2 * length, length)[:, None]
-        self._indices = np.empty(4 * len(indices), dtype=indices.dtype)
-        self._indices[self._upper] = self._indices[self._lower] = pairs
-        self._values = np.zeros(len(self._indices))
-        local, size = pattern.getLocalSize()[0], pattern.getSize()[0]
+        sparse = written_out(matrices)
+        self._entries, (local, size) = [A.getValuesCSR()[2] for A in sparse], sparse[0].getSizes()[0]
+        self._pattern = sparse[0].getValuesCSR()[:2]
         shape = ((2 * local, 2 * size), (2 * local, 2 * size))
-        csr = (self._indptr, self._indices, self._values)
-        self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=pattern.comm)
+        blocks = np.zeros((len(self._entries[0]), 2, 2))
+        self._matrix = PETSc.Mat().createBAIJ(shape, 2, csr=(*self._pattern, blocks), comm=sparse[0].comm)
         self._solver = DirectSolver(self._matrix)
-        self._update: Update | None = None
         self._x, self._b = self._matrix.createVecs()
 
     def factor(self, weights: Sequence[complex]) -> None:
         """Factorise Σ weight · matrix."""
-        values = np.asarray(sum(w * x for w, x in zip(weights, self._entries, strict=True)), dtype=np.complex128)
-        self._values[self._upper] = np.stack([values.real, -values.imag], axis=1)
-        self._values[self._lower] = np.stack([values.imag, values.real], axis=1)
-        self._matrix.setValuesCSR(self._indptr, self._indices, self._values)
+        z = np.asarray(sum(w * x for w, x in zip(weights, self._entries, strict=True)), dtype=np.complex128)
+        blocks = np.stack([z.real, -z.imag, z.imag, z.real], axis=1)
+        self._matrix.setValuesBlockedCSR(*self._pattern, blocks)
         self._matrix.assemble()
         self._solver.refresh()
-        self._update = None
-        for i, A in self._added:
-            self._update = Update(A.part, weights[i] * A.factor, self._column)
-
-    def _column(self, b: Any) -> Complex:
-        return self._solved(b.astype(np.complex128))
 
     def solve(self, b: Complex) -> Complex:
         """Return the owned part of the solution, of the owned part of a right-hand side.
@@ -403,10 +358,7 @@ class ComplexSolver:
         Raises:
             ComputationError: the matrix is singular to working precision.
         """
-        x = self._solved(b)
-        return x if self._update is None else self._update(x)
-
-    def _solved(self, b: Complex) -> Complex:
-        self._b.array[:] = np.ascontiguousarray(b).view(np.float64)
+        self._b.array[:] = 0.0
+        self._b.array[: 2 * len(b)] = np.ascontiguousarray(b).view(np.float64)
         self._solver.solve(self._b, self._x)
-        return np.array(self._x.array).view(np.complex128)
+        return np.array(self._x.array[: 2 * len(b)]).view(np.complex128)

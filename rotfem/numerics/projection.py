@@ -9,7 +9,7 @@ B Bᵀ is never written out, as it would fill a sparse matrix. Equations with A 
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -238,11 +238,11 @@ class Update:
 
     Args:
         part: B Bᵀ.
-        factor: c, real or complex.
+        factor: c.
         solve: owned rows of b ↦ those of A⁻¹ b.
     """
 
-    def __init__(self, part: LowRank, factor: complex, solve: Callable[[Array], Array]):
+    def __init__(self, part: LowRank, factor: float, solve: Callable[[Array], Array]):
         self._part, self._factor = part, factor
         self._Z = np.stack([solve(b) for b in part.B.T], axis=1)
         self._small = np.eye(part.B.shape[1]) + factor * part.along(self._Z)
@@ -250,3 +250,46 @@ class Update:
     def __call__(self, x: Array) -> Array:
         """Return (A + c B Bᵀ)⁻¹ b of x = A⁻¹ b, owned rows."""
         return np.asarray(x - self._Z @ np.linalg.solve(self._small, self._factor * self._part.along(x)))
+
+
+def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
+    """Return [[A, column], [row, corner]] as a new matrix of the kind of A; the last rank holds the new row.
+
+    Args:
+        A: square PETSc matrix, or `PlusLowRank`.
+        row: owned part of the new row.
+        column: owned part of the new column.
+        corner: the last diagonal entry.
+    """
+    if isinstance(A, PlusLowRank):
+        return PlusLowRank(bordered(A.sparse, row, column, corner), A.part.bordered(), A.factor)
+    comm = A.comm.tompi4py()
+    size, last = A.getSize()[0], comm.rank == comm.size - 1
+    indptr, indices, data = A.getValuesCSR()
+    ends = indptr[1:]
+    data, indices = np.insert(data, ends, column), np.insert(indices, ends, size)
+    indptr = indptr + np.arange(len(indptr), dtype=indptr.dtype)
+    whole = np.concatenate(comm.allgather(row))
+    if last:
+        data = np.concatenate([data, whole, [corner]])
+        indices = np.concatenate([indices, np.arange(size + 1)]).astype(indptr.dtype)
+        indptr = np.append(indptr, indptr[-1] + size + 1).astype(indptr.dtype)
+    local = len(row) + int(last)
+    shape = ((local, size + 1), (local, size + 1))
+    return PETSc.Mat().createAIJ(shape, csr=(indptr, indices.astype(indptr.dtype), data), comm=A.comm)
+
+
+def written_out(matrices: Sequence[Any]) -> list[Any]:
+    """Return sparse matrices whose sum, weighed, solves for x as that of these; the first has no B Bᵀ, and a weight.
+
+    Each column b of a B has an unknown y = c b·x more, behind the others: [[A, b], [c bᵀ, −1]] (x, y) = (f, 0).
+    """
+    out = list(matrices)
+    for i, A in enumerate(matrices):
+        if isinstance(A, PlusLowRank):
+            out[i] = A.sparse
+            for column in A.part.B.T:
+                b = np.append(column, np.zeros(out[0].getLocalSize()[0] - len(column)))
+                borders = {0: (0 * b, b, -1.0), i: (A.factor * b, 0 * b, 0.0)}
+                out = [bordered(M, *borders.get(j, (0 * b, 0 * b, 0.0))) for j, M in enumerate(out)]
+    return out

@@ -3,14 +3,13 @@
 A form is made of others some dozens of times before it is compiled, and for each of them UFL visits every node of every
 integrand to find the constants in it. Its signature visits what several integrands share once for each of them. On the
 way to the compiled forms of a spatial beam that is a third of the time. FFCx compares an operand with every node of a
-form to find its place, and UFL visits what is transformed already. What is found here is the same.
+form to find its place. What is found here is the same.
 """
 
 from __future__ import annotations
 
 import hashlib
 import weakref
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -22,8 +21,6 @@ from ufl.coefficient import BaseCoefficient
 from ufl.core.base_form_operator import BaseFormOperator
 from ufl.core.expr import Expr
 from ufl.core.terminal import Terminal
-from ufl.corealg import map_dag
-from ufl.corealg.multifunction import MultiFunction
 from ufl.integral import Integral
 from ufl.utils.counted import Counted
 
@@ -91,59 +88,13 @@ def compute_expression_hashdata(expression: Any, terminal_hashdata: dict[Any, An
     return bytes(hashes[expression])
 
 
-def map_expr_dags(
-    function: Any,
-    expressions: Sequence[Any],
-    compress: bool = True,
-    vcache: dict[Any, Any] | None = None,
-    rcache: dict[Any, Any] | None = None,
-) -> list[Any]:
-    """Return expressions as a function transforms them, as UFL's function of this name, in the same order of calls.
-
-    Args:
-        function: of a node and its operands, which are transformed already; of the node alone where that is all it
-            takes.
-        expressions: what is transformed.
-        compress: whether equal results become one object.
-        vcache: node ↦ what it was transformed to, also before.
-        rcache: result ↦ the one object that it became, also before.
-    """
-    done, kept = {} if vcache is None else vcache, {} if rcache is None else rcache
-    number = Expr._ufl_num_typecodes_
-    multi = isinstance(function, MultiFunction)
-    alone = function._is_cutoff_type if multi else [False] * number
-    handlers = function._handlers if multi else [function] * number
-    step = 1 if any(alone) else -1  # the last operand comes first, or the first one
-    for expression in expressions:
-        left = [expression]
-        while left:
-            node = left[-1]
-            if node in done:
-                left.pop()
-                continue
-            code = node._ufl_typecode_
-            if alone[code]:
-                result = handlers[code](node)
-            else:
-                operands = node.ufl_operands
-                missing = [operand for operand in operands[::step] if operand not in done]
-                if missing:
-                    left.extend(missing)
-                    continue
-                result = handlers[code](node, *[done[operand] for operand in operands])
-            left.pop()
-            done[node] = kept.setdefault(result, result) if compress else result
-    return [done[expression] for expression in expressions]
-
-
 def get_node_symbols(numberer: ValueNumberer, node: Any) -> Any:
     """Return the symbols of a node that has some, as FFCx's method of this name."""
     return numberer.V_symbols[numberer.G.e2i[node]]
 
 
 def install() -> None:
-    """Let UFL find terminals, hash and transform expressions, and FFCx find nodes, by the functions above."""
+    """Let UFL find terminals and hash expressions, and FFCx find nodes, by the functions above."""
     analysis.extract_type = extract_type
     signature.compute_expression_hashdata = compute_expression_hashdata
-    map_dag.map_expr_dags = map_expr_dags
     ValueNumberer.get_node_symbols = get_node_symbols
