@@ -42,7 +42,7 @@ from rotfem.version import versions
 VERBS = ("run", "modes", "campbell", "response", "check")
 
 RANGE = re.compile(r"([^:,]+):([^:,]+):(\d+)\s*([^\d\s].*)?")
-WITH_UNIT = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*([^-+.\d\s].*)")
+WITH_UNIT = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?+)\s*([^-+.\d\s].*)")
 
 
 @dataclass(frozen=True)

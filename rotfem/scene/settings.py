@@ -290,8 +290,8 @@ class Time(SceneModel):
         check_parameters(scheme, "scheme", self.parameters)
         if self.tolerance is not None and not estimates_error(scheme):
             able = ", ".join(show(other.name) for other in registry.schemes if estimates_error(other))
-            reason = f'scheme = "{self.scheme}" does not estimate its error, so its steps are fixed: give step instead'
-            raise problem("tolerance", self.tolerance, f"{reason} (adaptive steps: {able})")
+            reason = "does not estimate its error, so its steps are fixed: give step, no tolerance"
+            raise problem("scheme", self.scheme, f"{reason} (adaptive steps: {able})")
         self._check_steps()
 
     def _check_steps(self) -> None:

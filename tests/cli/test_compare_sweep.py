@@ -157,6 +157,8 @@ def test_values_of_a_key() -> None:
     assert all(isinstance(value, int) for value in values_of("4:16:4"))
     assert values_of("0:15:2rpm") == ["0 rpm", "15 rpm"]
     assert values_of("1,2.5,3 rpm") == ["1 rpm", "2.5 rpm", "3 rpm"]
+    assert values_of("0,1e-3") == [0, 1e-3]
+    assert values_of("1,1e3 N") == ["1 N", "1e3 N"]
     assert values_of("linear,reissner") == ["linear", "reissner"]
     assert values_of("[0, 1]") == ["[0, 1]"]
     assert values_of("10:20:11") == list(range(10, 21))  # which TOML takes for a time of day

@@ -278,10 +278,12 @@ def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
     assert adaptive is not None
     assert adaptive.parameters == {}
     message = refusal(time=table | {"scheme": "damped", "decay": 0.5})
-    assert 'time.tolerance = 0.001: scheme = "damped" does not estimate its error' in message
+    assert 'time.scheme = "damped": does not estimate its error' in message
     assert message.endswith(
-        'give step instead (adaptive steps: "generalised_alpha", "newmark", "esdirk4", "radau5", "estimated")'
+        'no tolerance (adaptive steps: "generalised_alpha", "newmark", "esdirk4", "radau5", "estimated")'
     )
+    wanted = refusal(time={"end": 1, "scheme": "damped", "decay": 0.5}, accuracy=1e-3)
+    assert wanted == message, "the tolerance is none that was given"
 
 
 def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
