@@ -4,7 +4,8 @@ A companion is a second march in lockstep, on a system of its own. It takes two 
 no knot lies between them, or the same steps as another companion.
 
 An error follows from a difference by the order of the elements, or by that of the scheme up to `CERTAIN`
-(`rotfem.refinement.estimate`). For schemes of higher order it is the difference itself.
+(`rotfem.refinement.estimate`), as long as a vibration as quick as the difference stays in phase. Otherwise it is the
+difference itself.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.distance import Output, tip
-from rotfem.refinement.estimate import error_of
+from rotfem.refinement.estimate import extrapolated
 
 #: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.
 Start = Callable[[Any], tuple[Array | None, Array | None]]
@@ -117,6 +118,9 @@ class Companion:
         self.difference, self.path, self.doubled, self.sound = (0.0, 0.0), 0.0, 0.0, True
         self.last: tuple[float, ...] = ()
         self.components: tuple[float, ...] = ()
+        #: Difference of the outputs at the end of the last step, and sums over steps for `late`.
+        self._apart: tuple[float, ...] = ()
+        self._squares, self._rates, self._cubes = 0.0, 0.0, 0.0
         #: Steps seen and not taken: one that may be doubled with the next, and one whose next leg is not known.
         self.waiting: list[Followed | None] = [None, None]
 
@@ -133,7 +137,15 @@ class Companion:
             rates[: len(v)] += v
         self.state = self.stepper.start(0.0, start, rates)
         self.last = tuple(map(float, self.output(self.system, self.state)))
-        self.components = (0.0,) * len(self.last)
+        self.components = self._apart = (0.0,) * len(self.last)
+
+    @property
+    def late(self) -> float:
+        """Phase error at the end, rad: Σ ω (ωh)² h/12 with ω² = ∫|ḋ|² dt/∫|d|² dt of the difference d.
+
+        (ωh)²/12 is the relative error of a frequency by the trapezoidal rule (Hughes 1987, chapter 9).
+        """
+        return float((self._rates / self._squares) ** 1.5 * self._cubes / 12.0) if self._squares > 0.0 else 0.0
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Observe a step of the followed march, and take the own steps that are complete with it."""
@@ -168,9 +180,14 @@ class Companion:
     def _arrived(self, old: State, new: State, leg: Leg) -> None:
         """Compare the outputs at the end of a step and within it, and pass it on."""
         step = self._step
-        before, self.last = self.last, self._compare(new, step.end)
+        before, since, h = self.last, self._apart, new.t - old.t
+        self.last, self._apart = self._compare(new, step.end)
         self.path += (way := dist(before, self.last))
         self.doubled += way if len(step.steps) > 1 else 0.0
+        size, change = hypot(*self._apart), dist(since, self._apart)
+        self._squares += h * size * size
+        self._rates += change * change / h
+        self._cubes += sum((b.t - a.t) ** 3 for a, b in step.steps)
         if self.interval is not None:
             row = round((old.t + new.t) / (2 * self.interval)) * self.interval
             if old.t < row < new.t:
@@ -200,8 +217,8 @@ class Companion:
         except ComputationError:
             self.sound = False
 
-    def _compare(self, here: State, there: State) -> tuple[float, ...]:
-        """Record the distance of the outputs at an instant; return the own output."""
+    def _compare(self, here: State, there: State) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Record the distance of the outputs at an instant; return the own output and the difference."""
         own = self.output(self.system, here)
         apart: Any = (own - self.output(self.followed, there)).tolist()
         size = hypot(*apart)
@@ -211,8 +228,11 @@ class Companion:
             self.difference = size, there.t
             least = self.part * size / self.system.structure.length
             self.stepper.newton.tolerance = max(self.stepper.newton.tolerance, least)
-        return tuple(map(float, own))
+        return tuple(map(float, own)), tuple(apart)
 
+
+#: Phase error φ (rad) of a vibration up to which its difference to doubled steps, 2A |sin 3φ/2|, grows with it.
+IN_PHASE = np.pi / 3
 
 #: Order up to which a scheme's order holds for all motions. That of others is reduced by stiff components, to the stage
 #: order or below (Hairer & Wanner 1996, section IV.15): it is taken as unknown.
@@ -295,7 +315,8 @@ class HistoryErrors:
         out: dict[str, float | None] = {"time": None, "space": None}
         if steps.sound and steps.doubled >= steps.path / 2:
             whole = steps.difference[0] * (steps.path / steps.doubled if steps.doubled > 0.0 else 1.0)
-            out["time"] = error_of(whole / scale, self.scheme.order if self.scheme.order <= CERTAIN else 0)
+            known = self.scheme.order <= CERTAIN and steps.late <= IN_PHASE
+            out["time"] = (extrapolated(whole, self.scheme.order) if known else whole) / scale
         if steps.sound and mesh is not None and mesh.sound and self.other is not None:
             out["space"] = self.other.error(mesh.difference[0] / scale)
         return out

@@ -5,7 +5,8 @@ Let u_h be an answer in steps or cells of size h, of order p. In the asymptotic 
     |u_h − u| = |u_h − u_rh| / (r^p − 1)
 
 (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4). Beyond it, or where no order is known, the
-error reported is the difference itself.
+error reported is the difference itself. The asymptotic range of meshes is one of small differences, that of steps one
+of small phase errors (`rotfem.refinement.companion`).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Relative difference of two answers up to which they count as in the asymptotic range.
+#: Relative difference of answers on two meshes up to which they count as in the asymptotic range.
 ASYMPTOTIC = 0.05
 
 #: Total error above which a warning names its causes, where no accuracy was asked for.
@@ -28,11 +29,14 @@ def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
 
     Args:
         difference: of the two, relative.
-        order: of convergence; 0 where none is known.
+        order: of convergence.
         ratio: of their step or cell sizes.
     """
-    if difference > ASYMPTOTIC or order < 1.0:
-        return difference
+    return difference if difference > ASYMPTOTIC else extrapolated(difference, order, ratio)
+
+
+def extrapolated(difference: float, order: float, ratio: float = 2.0) -> float:
+    """Return the error of the finer of two answers in the asymptotic range: their difference over r^p − 1."""
     return float(difference / (ratio**order - 1.0))
 
 
