@@ -22,8 +22,8 @@ from rotfem.scene import beams, loads, motion, plates, root, section, settings, 
 from rotfem.scene.extensions import Extensions
 from rotfem.scene.scene import Scene
 from rotfem.scene.structure import Damping
-from rotfem.scene.table import SceneModel, parameters_of
-from rotfem.scene.values import Bounds, Limits
+from rotfem.scene.table import SceneModel
+from rotfem.scene.values import Bounds, Limits, parameters_of
 
 PAGE = Path(__file__).with_name("scene-reference.md")
 

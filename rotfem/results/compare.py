@@ -118,10 +118,7 @@ class CompareResult(Rows):
 
     compared: list[Compared]
     index = ("result", "quantity")
-
-    def drawn(self) -> dict[str, str]:
-        """Return compare.png: the results over each other."""
-        return {"compare.png": "results.compare:compare_figure"}
+    figure = "results.compare:compare_figure"
 
     def tables(self) -> list[ShortTable]:
         """Return a table for each result but the reference; differences relative to the largest of the reference."""

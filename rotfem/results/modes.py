@@ -296,6 +296,7 @@ class ResponseResult(Rows):
     direct: npt.NDArray[np.complex128]
     modal: npt.NDArray[np.complex128]
     index = ("frequency",)
+    figure = "results.plots:response_figure"
 
     @property
     def outputs(self) -> list[str]:
@@ -318,10 +319,6 @@ class ResponseResult(Rows):
     def texts(self) -> dict[str, str]:
         """Return response.csv."""
         return {"response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows))}
-
-    def drawn(self) -> dict[str, str]:
-        """Return response.png: amplitudes and phases over frequency."""
-        return {"response.png": "results.plots:response_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return where every output is largest."""

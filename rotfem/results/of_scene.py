@@ -46,6 +46,7 @@ class CheckResult(Result):
     columns: dict[str, Array]
     nodes: dict[str, Array]
     triangles: npt.NDArray[np.int64] | None = None
+    figure = "results.of_scene:check_figure"
 
     @property
     def mass(self) -> float:
@@ -65,10 +66,6 @@ class CheckResult(Result):
     def texts(self) -> dict[str, str]:
         """Return check.csv, of a beam."""
         return {"check.csv": csv_text(self.columns)} if self.columns else {}
-
-    def drawn(self) -> dict[str, str]:
-        """Return check.png."""
-        return {"check.png": "results.of_scene:check_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
@@ -180,6 +177,7 @@ class ExplainResult(Rows):
     """
 
     index = ("name",)
+    figure = "results.of_scene:explain_figure"
 
     @property
     def effects(self) -> dict[str, Row]:
@@ -205,10 +203,6 @@ class ExplainResult(Rows):
         """Return explain.json."""
         explained = {name: self.summary[name] for name in ("groups", "outputs", "resolution")} | {"rows": self.rows}
         return {"explain.json": json_text(explained)}
-
-    def drawn(self) -> dict[str, str]:
-        """Return explain.png."""
-        return {"explain.png": "results.of_scene:explain_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return the dimensionless groups, then how much every effect, theory and discretisation changes the outputs.

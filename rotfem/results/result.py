@@ -43,6 +43,9 @@ class Result(ABC):
 
     summary: dict[str, Any]
 
+    #: What draws the figure of a result that has one, "module:function" below rotfem.
+    figure: ClassVar[str] = ""
+
     def with_summary(self, **entries: Any) -> Self:
         """Return this result with further entries of its summary, or others in the place of those it has."""
         return replace(self, summary={**self.summary, **entries})
@@ -91,9 +94,9 @@ class Result(ABC):
         """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""
         return {name: partial(resolved(f"rotfem.{function}"), self) for name, function in self.drawn().items()}
 
-    @abstractmethod
     def drawn(self) -> dict[str, str]:
         """Return file name ↦ "module:function", below rotfem, of the figures there are."""
+        return {f"{self.figure.partition(':')[2].removesuffix('_figure')}.png": self.figure}
 
     @abstractmethod
     def tables(self) -> list[ShortTable]:

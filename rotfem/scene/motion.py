@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo
+from pydantic import Discriminator, Field, PlainValidator, Tag, ValidationInfo
 
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.signals import Signal, TimeFunction, function_of, time_table
-from rotfem.scene.table import SceneModel, Unit, check_parameters, parameters_of, problem, with_parameters
-from rotfem.scene.values import Matrix, NonNegative, Number, Positive, Vector3, as_rows, as_vector3, such
+from rotfem.scene.table import SceneModel, Unit, problem
+from rotfem.scene.values import (
+    Matrix,
+    NonNegative,
+    Number,
+    Positive,
+    Vector3,
+    WithParameters,
+    as_rows,
+    as_vector3,
+    such,
+)
 
 Speed = Annotated[Number, Unit("rad/s")]
 Axis = Annotated[Vector3, such(as_vector3, any, "must be a direction; not all three components can be 0")]
@@ -144,38 +154,21 @@ class CallableMotion(Motion):
     angle: TimeFunction | None = None
 
 
-class LawMotion(Motion):
+class LawMotion(WithParameters, Motion):
     """Rotation by a registered `MotionLaw`, whose parameters are keys of the table.
 
     Attributes:
         type: name of the law.
     """
 
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Annotated[Number, Unit("")]]
+    CHOICE, ENTRIES = "type", motion_laws
 
     type: str
-
-    @classmethod
-    def keys(cls) -> list[str]:
-        """Return the keys of the table and the parameters of all laws."""
-        laws = [law for law in motion_laws if law.name not in BUILT_IN]
-        return list(dict.fromkeys([*super().keys(), *(key for law in laws for key in parameters_of(law))]))
 
     @property
     def law(self) -> Any:
         """The law with its parameters."""
-        return motion_laws[self.type](**self.__pydantic_extra__)
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        """Add the parameters of the law that are not given; a slip in its name comes before all others."""
-        if data.get("type") is None:
-            raise problem("type", None, f"required key is missing; allowed: {', '.join(map(show, motion_laws.names))}")
-        return with_parameters(cls, data, "type", motion_laws)
-
-    def _check(self) -> None:
-        check_parameters(motion_laws[self.type], "type", self.__pydantic_extra__)
+        return motion_laws[self.type](**self.parameters)
 
 
 _TABLES = (ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion, CallableMotion)

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo
+from pydantic import Field, PlainValidator, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import show
@@ -17,12 +17,21 @@ from rotfem.scene.table import (
     Unit,
     as_name,
     as_names,
-    check_parameters,
-    parameters_of,
     problem,
-    with_parameters,
 )
-from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_list, as_number, check_increasing, on_span
+from rotfem.scene.values import (
+    Bounds,
+    Count,
+    Matrix,
+    Number,
+    Positive,
+    WithParameters,
+    as_list,
+    as_number,
+    check_increasing,
+    on_span,
+    parameters_of,
+)
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
@@ -234,7 +243,7 @@ def _as_times(value: Any) -> tuple[float, ...]:
 Seconds = Annotated[Positive, Unit("s")]
 
 
-class Time(SceneModel):
+class Time(WithParameters):
     """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
     Attributes:
@@ -250,8 +259,7 @@ class Time(SceneModel):
         output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
     """
 
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Number]
+    CHOICE, ENTRIES = "scheme", registry.schemes
 
     end: Seconds = Field(description="a number greater than 0 (s)")
     step: Seconds | None = None
@@ -264,31 +272,17 @@ class Time(SceneModel):
     output_step: Seconds | None = None
 
     @classmethod
-    def keys(cls) -> list[str]:
-        """Return the keys of the table and the parameters of all schemes."""
-        return list(dict.fromkeys([*super().keys(), *(key for s in registry.schemes for key in parameters_of(s))]))
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Parameters of the scheme by name, those that are not given with their defaults."""
-        return dict(self.__pydantic_extra__)
-
-    @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others.
-
-        Where an accuracy is wanted and no steps are given, they follow from it.
-        """
+        """Add the scheme that is not given, and its parameters; steps follow from an accuracy where none are given."""
         given = {key: value for key, value in data.items() if value is not None}
         wanted = (info.context or {}).get("accuracy")
         if isinstance(wanted, float) and wanted > 0.0 and not {"step", "tolerance"} & given.keys():
             given["tolerance"] = wanted
-        return with_parameters(cls, {"scheme": usual(given)} | given, "scheme", registry.schemes)
+        return super()._read({"scheme": usual(given)} | given, info)
 
     def _check(self) -> None:
-        scheme = registry.schemes[self.scheme]
-        check_parameters(scheme, "scheme", self.parameters)
-        if self.tolerance is not None and not estimates_error(scheme):
+        super()._check()
+        if self.tolerance is not None and not estimates_error(registry.schemes[self.scheme]):
             able = ", ".join(show(other.name) for other in registry.schemes if estimates_error(other))
             reason = "does not estimate its error, so its steps are fixed: give step, no tolerance"
             raise problem("scheme", self.scheme, f"{reason} (adaptive steps: {able})")

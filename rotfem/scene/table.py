@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from inspect import Parameter, Signature
 from typing import TYPE_CHECKING, Any, Self, get_args, get_type_hints
 
@@ -262,38 +262,6 @@ def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
         parts.append(f"{', '.join(foreign)} cannot be combined with the rest")
     possible = "".join(f"\n    ({i}) {way}" for i, way in enumerate(ways, start=1))
     raise problem("", None, f"not a complete set of keys: {'; '.join(parts)}; give exactly one of{possible}")
-
-
-def parameters_of(entry: type) -> dict[str, Field[Any]]:
-    """Return name ↦ field of the parameters of a registered class, which are keys of a table: those of a dataclass."""
-    return {field.name: field for field in fields(entry) if field.init} if is_dataclass(entry) else {}
-
-
-def with_parameters(
-    table: type[SceneModel], data: Mapping[str, Any], key: str, registry: Registry[Any]
-) -> dict[str, Any]:
-    """Return the data of a table with the parameters that are not given of the class that `key` names.
-
-    Raise where there is no such class, or a parameter without a default is missing.
-    """
-    name, defaults = as_name(data[key], registry, key), dict[str, Any]()
-    for parameter, field in parameters_of(registry[name]).items():
-        if parameter in table.model_fields:
-            raise problem(key, name, f"cannot have a parameter {parameter}, which is a key of the table already")
-        if field.default is not MISSING:
-            defaults[parameter] = field.default
-        elif parameter not in data:
-            raise problem(parameter, None, f'required key is missing; {key} = "{name}" needs it')
-    return {**defaults, **data}
-
-
-def check_parameters(entry: Any, key: str, parameters: Mapping[str, Any]) -> None:
-    """Refuse parameters that the registered class that `key` names does not have, or not allow."""
-    for name, value in parameters.items():
-        if name not in parameters_of(entry):
-            raise problem(name, value, f'has no meaning with {key} = "{entry.name}"')
-    for name, allowed in entry.check(dict(parameters)).items():
-        raise problem(name, parameters[name], allowed)
 
 
 # --- errors -----------------------------------------------------------------------------------------------------------

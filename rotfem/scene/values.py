@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from itertools import chain, pairwise
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, ClassVar, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import PlainValidator, ValidationError, ValidationInfo
+from pydantic import ConfigDict, PlainValidator, ValidationError, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from rotfem.scene.table import SceneModel, problem, problems_at
+from rotfem.errors import show
+from rotfem.registry import Registry
+from rotfem.scene.table import SceneModel, Unit, as_name, problem, problems_at
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Vector3: TypeAlias = tuple[float, float, float]
@@ -294,6 +296,60 @@ ShearCorrection = Annotated[float, PlainValidator(Bounds(gt=0.0, le=1.0).number)
 Count = Annotated[int, PlainValidator(Bounds(ge=1).integer)]
 Vector = Annotated[Vector3, PlainValidator(as_vector3)]
 PaddedVector = Annotated[Vector3, PlainValidator(as_padded_vector3)]
+
+
+# --- parameters of what is registered ---------------------------------------------------------------------------------
+
+
+def parameters_of(entry: type) -> dict[str, Field[Any]]:
+    """Return name ↦ field of the parameters of a registered class, which are keys of a table: those of a dataclass."""
+    return {field.name: field for field in fields(entry) if field.init} if is_dataclass(entry) else {}
+
+
+class WithParameters(SceneModel):
+    """A table of which one key names a registered class, whose parameters are keys as well."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Annotated[Number, Unit("")]]
+
+    #: The key, and where the classes are registered.
+    CHOICE: ClassVar[str]
+    ENTRIES: ClassVar[Registry[Any]]
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the keys of the table and the parameters of all classes."""
+        return list(dict.fromkeys([*super().keys(), *(key for entry in cls.ENTRIES for key in parameters_of(entry))]))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name, those that are not given with their defaults."""
+        return dict(self.__pydantic_extra__)
+
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Add the parameters that are not given; a slip in the name of the class comes before all others."""
+        key, defaults = cls.CHOICE, dict[str, Any]()
+        if data.get(key) is None:
+            raise problem(key, None, f"required key is missing; allowed: {', '.join(map(show, cls.ENTRIES.names))}")
+        name = as_name(data[key], cls.ENTRIES, key)
+        for parameter, field in parameters_of(cls.ENTRIES[name]).items():
+            if parameter in cls.model_fields:
+                raise problem(key, name, f"cannot have a parameter {parameter}, which is a key of the table already")
+            if field.default is not MISSING:
+                defaults[parameter] = field.default
+            elif parameter not in data:
+                raise problem(parameter, None, f'required key is missing; {key} = "{name}" needs it')
+        return {**defaults, **data}
+
+    def _check(self) -> None:
+        """Refuse parameters that the class does not have, or not allow."""
+        entry = self.ENTRIES[getattr(self, self.CHOICE)]
+        for name, value in self.parameters.items():
+            if name not in parameters_of(entry):
+                raise problem(name, value, f'has no meaning with {self.CHOICE} = "{entry.name}"')
+        for name, allowed in entry.check(self.parameters).items():
+            raise problem(name, self.parameters[name], allowed)
 
 
 # --- how much may be asked for ----------------------------------------------------------------------------------------

@@ -145,6 +145,7 @@ class CostResult(Rows):
     scene: Scene = field(repr=False)
     references: dict[str, Reference] = field(default_factory=dict, repr=False)
     dimension = "setting"
+    figure = "commands.cost.result:cost_figure"
 
     @property
     def front(self) -> list[Row]:
@@ -231,10 +232,6 @@ class CostResult(Rows):
         keys = ("output", "references", "model_errors", "recommended", "recommendations")
         found = {**{k: self.summary[k] for k in keys}, "rows": self.rows}
         return {**super().texts(), "cost.json": json_text(found)}
-
-    def drawn(self) -> dict[str, str]:
-        """Return cost.png."""
-        return {"cost.png": "commands.cost.result:cost_figure"}
 
 
 def _cost(row: Row) -> str:
