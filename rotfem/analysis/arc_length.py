@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from rotfem.analysis.load_steps import LoadFactors, balance, check_inside_out, recounted
 from rotfem.errors import ComputationError
-from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
+from rotfem.numerics.linear import DirectSolver, surely_negative
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
@@ -83,7 +83,6 @@ class Tracer:
     def __init__(self, system: Any, growth: LoadFactors, newton: Newton):
         self.system, self.growth, self.newton = system, growth, newton
         self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
-        self._y, self._z = Increment(system.V), Increment(system.V)
 
     def follow(self, past_limits: bool) -> LoadPath:
         """Return where the path leads from its start.
@@ -172,11 +171,11 @@ class Tracer:
         residual = self.system.residual()
         slope.axpy(-1.0, residual)
         solver = DirectSolver(self.system.tangent(1.0, 0.0, 0.0)[0])
-        return self._y.solve(solver, residual), self._z.solve(solver, slope)
+        return self.system.local(solver.solve(residual)), self.system.local(solver.solve(slope))
 
     def _point(self, q: Array, s: float, before: Point | None) -> Point:
         """Return an equilibrium with the tangent of the path there, in the direction from the one before."""
-        z = self._solutions(q, s)[1].copy()
+        z = self._solutions(q, s)[1]
         with np.errstate(all="ignore"):
             size = np.sqrt(self._product(z, z) + 1.0)
         if not np.isfinite(size):

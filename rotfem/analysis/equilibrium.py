@@ -29,7 +29,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
+from rotfem.numerics.linear import DirectSolver, surely_negative
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
@@ -96,7 +96,7 @@ def _compliance_lost(system: Any, growth: LoadFactors) -> bool:
     system.set_state(q)
     K, load = system.matrix(1.0, 0.0, 0.0, 1.0), system.residual()
     try:
-        return rounded_compliance(system, K, Increment(system.V).solve(DirectSolver(K), load).copy()) >= KNOWN
+        return rounded_compliance(system, K, system.local(DirectSolver(K).solve(load))) >= KNOWN
     except ComputationError:
         return False
 
@@ -219,7 +219,6 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
 def _led(system: System, displacement: float, q: Array, F: float, newton: Newton) -> tuple[Array, float]:
     """Return (q, F) of the equilibrium with u_2(L) = displacement (m), from that of another displacement."""
     tip, x = system.structure.tip_values, np.append(q, F)
-    under_load, under_residual = Increment(system.V), Increment(system.V)
 
     def correction(before: Array | None) -> Array:
         q, F = x[:-1], float(x[-1])
@@ -229,7 +228,7 @@ def _led(system: System, displacement: float, q: Array, F: float, newton: Newton
         residual = system.residual()
         loaded.axpy(-1.0, residual)
         solver = DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0])
-        dq, per_force = under_residual.solve(solver, residual), under_load.solve(solver, loaded)
+        dq, per_force = system.local(solver.solve(residual)), system.local(solver.solve(loaded))
         if tip(per_force)[1] == 0.0:
             raise ComputationError("a force at the tip does not move it by anything above round-off")
         dF = (displacement - tip(q)[1] - tip(dq)[1]) / tip(per_force)[1]

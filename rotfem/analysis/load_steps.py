@@ -14,7 +14,7 @@ from rotfem.analysis.theory_error import KNOWN, conditioning
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.reference_rotation import BeyondReach
 
@@ -230,11 +230,11 @@ def balance(
         checked: whether a state that is turned inside out is refused.
     """
     growth.set(system, share)
-    q, dx = guess.copy(), Increment(system.V)
+    q = guess.copy()
 
     def correction(before: Array | None) -> Array:
         b = system.residual()
-        return dx.solve(DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0]), b)
+        return system.local(DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0]).solve(b))
 
     increment = limited(system, q, correction)
     if system.linear:

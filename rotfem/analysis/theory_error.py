@@ -46,7 +46,7 @@ from rotfem.mechanics.theories import Theory, compared, richest, stiffened
 from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import Pencil, RoundOff
 from rotfem.numerics.forms import added
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import times
 
 Array = npt.NDArray[np.float64]
@@ -190,7 +190,7 @@ def static_rotation(system: Any, end: float) -> float:
 def _static(system: Any, factor: DirectSolver | None = None) -> Array:
     """Return what the forces at the undeformed state and time set displace the structure by, a local dof array."""
     solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))
-    return Increment(system.V).solve(solver, system.residual()).copy()
+    return np.asarray(system.local(solver.solve(system.residual())))
 
 
 def _tip(system: Any, x: Array) -> Array:
@@ -217,7 +217,7 @@ def _correction(system: Any, q: Array, time: float = np.inf, first: Array | None
         r.array[:] -= times(system.matrix(0.0, 0.0, 2.0 / time**2, 0.0), before[: len(r.array), None])[:, 0]
     system.set_state(q)
     K = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0)
-    return -Increment(system.V).solve(DirectSolver(K), r).copy()
+    return -np.asarray(system.local(DirectSolver(K).solve(r)))
 
 
 def _residual(system: Any, q: Array) -> Any:

@@ -26,7 +26,6 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, weighted
-from rotfem.numerics.linear import Increment
 from rotfem.numerics.projection import bordered
 from rotfem.structures.root_reaction import along_axis
 
@@ -157,7 +156,6 @@ class BorderedSystem:
         self._row = inner.compilations, HubRow(inner, once)
         self.angle = self.row.angle
         self.hub = self.row.hub
-        self._dz = Increment(inner.V)
 
     def __getattr__(self, name: str) -> Any:
         if name == "inner":
@@ -248,7 +246,7 @@ class BorderedSystem:
         return self._eliminated(solver, (R, b), row.row((0.0, 0.0, 1.0)), r, row.diagonal(0.0, 1.0))
 
     def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
-        y, z = self.inner._dx.solve(solver, right[0]), self._dz.solve(solver, right[1])
+        y, z = (self.inner.local(solver.solve(b)) for b in right)
         n, comm = len(c.array), self.inner.comm
         sums = np.array([c.array @ y[:n], c.array @ z[:n]])
         cy, cz = comm.allreduce(sums) if comm.size > 1 else sums

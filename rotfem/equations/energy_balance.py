@@ -43,7 +43,7 @@ class EnergyBalance(Solutions):
 
     def __init__(self, system: Any):
         self.system, self.model, self.comm = system, system.model, system.comm
-        self.seconds, self._dx, self._solver = system.seconds, system._dx, None
+        self.seconds, self._solver, self.local = system.seconds, None, system.local
         self._k = system.structure.k
         *self._functions, self._test = self._k.functions
         self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))

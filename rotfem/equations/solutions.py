@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from rotfem.numerics.linear import ComplexSolver, DirectSolver, Increment, SingularSolver, combine, is_regular
+from rotfem.numerics.linear import ComplexSolver, DirectSolver, SingularSolver, combine, is_regular
 
 Array = npt.NDArray[Any]
 
@@ -29,6 +29,7 @@ class Solutions:
     matrix: Callable[..., Any]
     set_state: Callable[..., None]
     set_time: Callable[..., None]
+    local: Callable[[Array], Array]
     count_rotations_from: Callable[[Any], None]
     seconds: dict[str, float]
     keeps_factor: bool
@@ -37,7 +38,6 @@ class Solutions:
     factored: dict[str, Any] | None = None
     factored_before = 0
     _state: tuple[Array, ...]
-    _dx: Increment
     _solver: DirectSolver | None
     _mass: tuple[Any, tuple[DirectSolver | SingularSolver, Array]] | None = None
 
@@ -60,7 +60,7 @@ class Solutions:
     def _timed(self, started: float, b: Any, A: Any = None, changed: bool = False) -> Array:
         """Return the solution of A x = b, of the factor at hand without A, and count the time of its two parts."""
         assembled = perf_counter()
-        dq = self._dx.solve(self.factor(A, changed), b)
+        dq = self.local(self.factor(A, changed).solve(b))
         self.seconds["assemble"] += assembled - started
         self.seconds["solve"] += perf_counter() - assembled
         return dq
@@ -105,7 +105,7 @@ class Solutions:
         solver, massless = self.mass_solver(at_rest)
         b = self.residual()
         b.array[massless] = 0.0
-        return self._dx.solve(solver, b)
+        return self.local(solver.solve(b))
 
     def mass_solver(self, at_rest: bool = False) -> tuple[DirectSolver | SingularSolver, Array]:
         """Return a solver with M at the state, or at rest (see `acceleration`), and unknowns without inertia."""
@@ -158,7 +158,7 @@ class Linearised:
         self._real_matrix = self._matrices[0].duplicate()
         self._real = DirectSolver(self._real_matrix)
         self._complex = ComplexSolver(self._matrices)
-        self._x, self._b = self._real_matrix.createVecs()
+        self._b = self._real_matrix.createVecLeft()
 
     def take(self, shifts: tuple[float, complex]) -> None:
         """Factorise with a real and a complex s (1/s), unless the factors at hand are those."""
@@ -173,5 +173,4 @@ class Linearised:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
         rows = len(self._b.array)
         self._b.array[:] = real[:rows]
-        self._real.solve(self._b, self._x)
-        return self.system.local(self._x.array.copy()), self.system.local(self._complex.solve(complex_[:rows]))
+        return self.system.local(self._real.solve(self._b)), self.system.local(self._complex.solve(complex_[:rows]))

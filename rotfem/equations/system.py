@@ -29,7 +29,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import Assembler, added
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
 from rotfem.structures.root_reaction import RootReaction
 
@@ -104,7 +104,6 @@ class System(Solutions, ABC):
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)
         self._solver: DirectSolver | None = None
-        self._dx = Increment(self.V)
         self.by_mode: ByMode | None = None
         self.assembler = self._compile()
         self.A = self.assembler.pattern

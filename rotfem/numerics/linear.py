@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics import compat
 from rotfem.numerics.projection import PlusLowRank, Update, dense, sparse_part, written_out
 
 Array = npt.NDArray[np.float64]
@@ -105,7 +103,7 @@ class DirectSolver:
         self._whole, self.A, self.factorisations = A, sparse_part(A), 0
         self._update: Update | None = None
         A = self.A
-        self._ksp = PETSc.KSP().create(A.comm)
+        self._ksp, self._x = PETSc.KSP().create(A.comm), A.createVecRight()
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         size = A.getSize()[0]
@@ -137,7 +135,7 @@ class DirectSolver:
             self.negative = self._factorise_counting()
         self._stale = False
         whole = self._whole
-        self._update = Update(whole.part, whole.factor, self._column) if isinstance(whole, PlusLowRank) else None
+        self._update = Update(whole.part, whole.factor, self._columns) if isinstance(whole, PlusLowRank) else None
 
     def _set_up(self) -> None:
         self._ksp.setOperators(self.A)
@@ -182,17 +180,19 @@ class DirectSolver:
             raise ComputationError(SINGULAR)
         return int(negative)
 
-    def solve(self, b: Any, x: Any) -> None:
-        """Solve A x = b.
+    def solve(self, b: Any) -> Array:
+        """Return the owned rows of the solution of A x = b, a PETSc vector.
 
         Raises:
             ComputationError: A is singular to working precision.
         """
         if self._stale:
             self.factorise()
-        self._apply(b, x)
-        if self._update is not None:
-            x.array[:] = self._update(x.array)
+        self._ksp.solve(b, self._x)
+        if self._ksp.getConvergedReason() < 0:
+            raise ComputationError(SINGULAR)
+        x = np.array(self._x.array)
+        return x if self._update is None else self._update(x)
 
     def solve_all(self, right: Array) -> Array:
         """Return the solutions for columns of owned rows, (n, m), which is quicker than one after the other.
@@ -202,21 +202,14 @@ class DirectSolver:
         """
         if self._stale:
             self.factorise()
-        out = np.empty_like(right, order="F")
-        self._ksp.getPC().getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
+        out = self._columns(right)
         return out if self._update is None else self._update(out)
 
-    def _apply(self, b: Any, x: Any) -> None:
-        self._ksp.solve(b, x)
-        if self._ksp.getConvergedReason() < 0:
-            raise ComputationError(SINGULAR)
-
-    def _column(self, b: Array) -> Array:
-        """Return A⁻¹ b of owned rows."""
-        x, right = self.A.createVecs()
-        right.array[:] = b
-        self._apply(right, x)
-        return np.array(x.array)
+    def _columns(self, right: Array) -> Array:
+        """Return the solutions with the factor alone."""
+        out = np.empty_like(right, order="F")
+        self._ksp.getPC().getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
+        return out
 
 
 def symmetric(A: Any) -> bool:
@@ -279,48 +272,27 @@ class SingularSolver:
     def __init__(self, A: Any, K: Any):
         self._A, both = A, A.copy()
         both.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self._solver, self._felt = DirectSolver(both), A.createVecs()[0]
+        self._solver, (self._x, self._felt) = DirectSolver(both), A.createVecs()
 
-    def solve(self, b: Any, x: Any) -> None:
-        """Write the solution for b into x."""
-        self._solver.solve(b, x)
-        self._A.mult(x, self._felt)
-        self._solver.solve(self._felt, x)
+    def solve(self, b: Any) -> Array:
+        """Return the owned rows of the solution for b, a PETSc vector."""
+        self._x.array[:] = self._solver.solve(b)
+        self._A.mult(self._x, self._felt)
+        return self._solver.solve(self._felt)
 
 
 def is_regular(A: Any, solver: DirectSolver) -> bool:
     """Return whether a solver gives back what A was multiplied with, as it does unless A is singular to round-off."""
-    (x, b), found = A.createVecs(), A.createVecs()[0]
+    x, b = A.createVecs()
     b.array[:] = np.cos(np.arange(b.getLocalSize()))
     try:
-        solver.solve(b, x)
+        x.array[:] = solver.solve(b)
         A.mult(x, b)
-        solver.solve(b, found)
+        change = x.duplicate()
+        change.array[:] = solver.solve(b) - x.array
     except ComputationError:
         return False
-    found.axpy(-1.0, x)
-    return bool(found.norm() <= 1e-2 * x.norm())
-
-
-class Increment:
-    """A vector over the dofs of a space that receives solutions.
-
-    Args:
-        V: function space.
-    """
-
-    def __init__(self, V: fem.FunctionSpace):
-        self.function = fem.Function(V)
-        self._x = compat.wrap(self.function.x)
-        self._array: Array = self.function.x.array
-        self._shared = V.mesh.comm.size > 1
-
-    def solve(self, solver: DirectSolver | SingularSolver, b: Any) -> Array:
-        """Return the local array (owned and ghosts) of the solution of A x = b; it is overwritten by the next call."""
-        solver.solve(b, self._x)
-        if self._shared:
-            self.function.x.scatter_forward()
-        return self._array
+    return bool(change.norm() <= 1e-2 * x.norm())
 
 
 Complex = npt.NDArray[np.complex128]
@@ -342,7 +314,7 @@ class ComplexSolver:
         blocks = np.zeros((len(self._entries[0]), 2, 2))
         self._matrix = PETSc.Mat().createBAIJ(shape, 2, csr=(*self._pattern, blocks), comm=sparse[0].comm)
         self._solver = DirectSolver(self._matrix)
-        self._x, self._b = self._matrix.createVecs()
+        self._b = self._matrix.createVecLeft()
 
     def factor(self, weights: Sequence[complex]) -> None:
         """Factorise Σ weight · matrix."""
@@ -360,5 +332,4 @@ class ComplexSolver:
         """
         self._b.array[:] = 0.0
         self._b.array[: 2 * len(b)] = np.ascontiguousarray(b).view(np.float64)
-        self._solver.solve(self._b, self._x)
-        return np.array(self._x.array[: 2 * len(b)]).view(np.complex128)
+        return self._solver.solve(self._b)[: 2 * len(b)].view(np.complex128)

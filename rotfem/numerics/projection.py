@@ -239,12 +239,12 @@ class Update:
     Args:
         part: B Bᵀ.
         factor: c.
-        solve: owned rows of b ↦ those of A⁻¹ b.
+        solve: columns of owned rows of b ↦ those of A⁻¹ b.
     """
 
     def __init__(self, part: LowRank, factor: float, solve: Callable[[Array], Array]):
         self._part, self._factor = part, factor
-        self._Z = np.stack([solve(b) for b in part.B.T], axis=1)
+        self._Z = solve(part.B)
         self._small = np.eye(part.B.shape[1]) + factor * part.along(self._Z)
 
     def __call__(self, x: Array) -> Array:

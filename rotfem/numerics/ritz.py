@@ -302,11 +302,7 @@ class RitzPairs:
                 solver = self._solver_at(float(lam.real))
                 vectors = np.stack([self.right[:, i].real, self.left[:, i].real], axis=1)
                 sides = list((2 * lam.real * times(M, vectors) + times(C, vectors)).T)
-            for r in sides:
-                for part in (r.real, r.imag):
-                    self._b.array[:] = part
-                    solver.solve(self._b, self._x)
-                    columns.append(self._x.array.copy())
+            columns += [*solver.solve_all(np.array([part for r in sides for part in (r.real, r.imag)]).T).T]
         # by largest entries, whose squares may be no numbers any more; lengths are made one by `add`
         sizes = summed(self.comm, np.array([np.abs(c).max(initial=0.0) for c in columns]))
         new = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
