@@ -79,7 +79,9 @@ class Beam(Structure):
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     def _radius(self) -> float:
-        """Return √(EI/EA) at the clamp, of the least of the bending stiffnesses, m."""
+        """Return √(EI/EA) at the clamp, of the least of the bending stiffnesses, m; 0 of a beam without a section."""
+        if self._section is None:
+            return 0.0
         at = self._section.at(np.zeros(1))
         if "stiffness" in at:
             C = np.diag(np.asarray(at["stiffness"]).reshape(6, 6))
