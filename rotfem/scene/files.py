@@ -248,16 +248,7 @@ def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
     """
     rows: dict[int, tuple[float, ...]] = {}
     width, top = 0, 0  # columns of the first row, and its line
-    plain = text.isascii() and "_" not in text
     for number, line in enumerate(text.split("\n"), start=1):
-        if plain and top:  # most lines hold numbers and nothing else
-            try:
-                row = tuple(map(float, line.split(",")))
-            except ValueError:
-                row = ()
-            if len(row) == width and all(map(math.isfinite, row)):
-                rows[number] = row
-                continue
         cells = _cells(line)
         if not cells:
             continue

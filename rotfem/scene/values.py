@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
-from itertools import chain, pairwise
-from typing import Annotated, Any, ClassVar, TypeAlias, cast
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -176,8 +176,6 @@ def as_rows(value: Any, columns: Sequence[int], shape: str, row_name: Callable[[
         raise problem("", value, f"must be {shape}")
     if len(value[0]) not in columns:
         raise problem("", value, f"must be {shape}; {row_name(1)} has {len(value[0])} entries")
-    if (quick := _quick_rows(value)) is not None:
-        return quick
     for i, row in enumerate(value, start=1):
         if len(row) != len(value[0]):
             reason = f"{row_name(i)} has {len(row)} entries, {row_name(1)} has {len(value[0])}"
@@ -186,19 +184,6 @@ def as_rows(value: Any, columns: Sequence[int], shape: str, row_name: Callable[[
             for entry in row:
                 as_number(entry)
     return tuple(tuple(float(entry) for entry in row) for row in value)
-
-
-def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
-    """Return a table of good numbers as a tuple of rows; None where every entry has to be checked."""
-    if set(map(len, value)) != {len(value[0])} or not set(map(type, chain(*value))) <= {int, float}:
-        return None
-    try:
-        table = np.array(value, dtype=np.float64)
-    except OverflowError:
-        return None
-    size, rows = np.abs(table), cast(list[list[float]], table.tolist())
-    good = np.all((size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST)))
-    return tuple(tuple(row) for row in rows) if good else None
 
 
 def check_increasing(rows: Matrix, value: Any, shape: str, row_name: Callable[[int], str] = "row {}".format) -> None:

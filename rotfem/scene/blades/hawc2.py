@@ -207,11 +207,12 @@ def _matrices(table: dict[str, Array]) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Command:
-    """The words of a line, and where it stands."""
+    """The words of a line, where it stands, and of `begin NAME` the commands before its end."""
 
     deck: Deck
     line: int
     words: list[str]
+    inner: list[Command] = field(default_factory=list)
 
     def fail(self, reason: str, column: int | None = None) -> NoReturn:
         """Refuse the file here."""
@@ -230,39 +231,33 @@ class Command:
             self.fail(f"{number:g} must be a whole number", column)
         return int(number)
 
-
-@dataclass
-class Block:
-    """What stands between `begin NAME` and its end: commands and blocks in it."""
-
-    begin: Command
-    commands: list[Command] = field(default_factory=list)
-    blocks: list[Block] = field(default_factory=list)
-
     @property
     def name(self) -> str:
         """What `begin` says."""
-        return self.begin.words[1].lower() if len(self.begin.words) > 1 else ""
+        return self.words[1].lower() if len(self.words) > 1 else ""
+
+    def all(self, name: str) -> list[Command]:
+        """Return the inner commands of a name."""
+        return [each for each in self.inner if each.words[0].lower() == name]
 
     def find(self, name: str) -> Command | None:
-        """Return the last command of a name; None if there is none."""
-        found = [each for each in self.commands if each.words[0].lower() == name]
-        return found[-1] if found else None
+        """Return the last inner command of a name; None if there is none."""
+        return next(reversed(self.all(name)), None)
 
     def command(self, name: str) -> Command:
-        """Return a command that must be there, with something behind its name."""
+        """Return an inner command that must be there, with something behind its name."""
         found = self.find(name)
         if found is None:
-            self.begin.fail(f"begin {self.name} has no {name}")
+            self.fail(f"begin {self.name} has no {name}")
         if len(found.words) < 2:
             found.fail(f"{name} has nothing behind it")
         return found
 
-    def block(self, name: str) -> Block:
-        """Return a block that must be there."""
-        found = next((each for each in self.blocks if each.name == name), None)
+    def block(self, name: str) -> Command:
+        """Return an inner `begin NAME` that must be there."""
+        found = next((each for each in self.all("begin") if each.name == name), None)
         if found is None:
-            self.begin.fail(f"begin {self.name} has no begin {name}")
+            self.fail(f"begin {self.name} has no begin {name}")
         return found
 
 
@@ -272,7 +267,7 @@ def _is_htc(deck: Deck) -> bool:
     return any(each[:2] == ["begin", "main_body"] or each[:1] == ["continue_in_file"] for each in words)
 
 
-def _main_body(deck: Deck, wanted: str | None) -> Block:
+def _main_body(deck: Deck, wanted: str | None) -> Command:
     """Return a main body by its name, or the only one there is; a copy is the body that it copies."""
     bodies = {block.command("name").words[1]: block for block in _main_bodies(deck)}
     allowed = ", ".join(show(name) for name in bodies)
@@ -288,15 +283,15 @@ def _main_body(deck: Deck, wanted: str | None) -> Block:
         if copied is None:
             return bodies[name]
         name = copied.words[1] if len(copied.words) > 1 else ""
-    bodies[name].begin.fail("main bodies copy each other in a circle")
+    bodies[name].fail("main bodies copy each other in a circle")
 
 
-def _c2_def(body: Block) -> tuple[list[list[float]], Command]:
+def _c2_def(body: Command) -> tuple[list[list[float]], Command]:
     """Return rows (x, y, z in m, twist in degrees) of a body's line, and the command that says how many there are."""
     block = body.block("c2_def")
     head = block.command("nsec")
     count = head.whole(2)
-    sections = [each for each in block.commands if each.words[0].lower() == "sec"]
+    sections = block.all("sec")
     if count < 2 or len(sections) != count:
         head.fail(f"nsec is {count}, at least 2, and there are {len(sections)} lines of sec", 2)
     for number, section in enumerate(sections, start=1):
@@ -307,26 +302,23 @@ def _c2_def(body: Block) -> tuple[list[list[float]], Command]:
     return [[section.number(column) for column in range(3, 7)] for section in sections], head
 
 
-def _main_bodies(deck: Deck) -> list[Block]:
+def _main_bodies(deck: Deck) -> list[Command]:
     """Return all main bodies of a file and of those in which it continues."""
-    found: list[Block] = []
-    stack: list[Block] = []
+    found: list[Command] = []
+    stack: list[Command] = []
     for command in _commands(deck, deck, DEEPEST):
         word = command.words[0].lower()
+        if stack and word != "end":
+            stack[-1].inner.append(command)
         if word == "begin":
-            block = Block(command)
-            if stack:
-                stack[-1].blocks.append(block)
-            stack.append(block)
+            stack.append(command)
         elif word == "end":
             if not stack:
                 command.fail("an end without a begin")
             if (closed := stack.pop()).name == "main_body":
                 found.append(closed)
-        elif stack:
-            stack[-1].commands.append(command)
     if stack:
-        stack[-1].begin.fail(f"begin {stack[-1].name} has no end")
+        stack[-1].fail(f"begin {stack[-1].name} has no end")
     return found
 
 
