@@ -33,7 +33,7 @@ from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.structures.mode_names import Wave, with_overdamped, with_whirl
@@ -265,10 +265,11 @@ class ModalAnalysis:
             pencil.factor = None
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
-        sizes = np.abs(pairs.values)
-        flexible = np.flatnonzero(sizes > ZERO * np.median(sizes)) if self.free else np.arange(len(sizes))
+        slowest = int(np.argmin(np.abs(pairs.values)))
+        rigid = self.free and pairs.bounds[slowest] >= 1.0
+        flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
-        return Spinning(speed, q, pencil, chosen, clamped, len(flexible) < len(sizes), self.system.reference)
+        return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.

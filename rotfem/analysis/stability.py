@@ -29,7 +29,7 @@ from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.balance import unknown_scale
-from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.linear import negative_eigenvalues, righted, surely_negative, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed, times
@@ -160,8 +160,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             return Stability(negative, growth, frequency, complete=False)
         values, bounds = pairs.values, pairs.bounds
         if target > 0.0:
-            flexible = np.abs(values) > ZERO * np.median(np.abs(values))
-            values, bounds = values[flexible], bounds[flexible]
+            values, bounds = values[bounds < 1.0], bounds[bounds < 1.0]
         # Growth that round-off can have made is none.
         grows = values[values.real > np.maximum(GROWTH, bounds) * np.abs(values)]
         lost = len(grows) < int(np.sum(values.real > GROWTH * np.abs(values)))

@@ -70,10 +70,8 @@ def modes_at_rest(system: Any, count: int) -> ModesAtRest:
     M, K = system.matrices_at_rest()
     count = min(count, massed(M))
     pairs = Pencil(M, M.duplicate(), K).solve(min(count + MORE, massed(M)))
-    found = np.abs(pairs.values)
-    vibrates = found > 1e-3 * np.median(found[:FIRST])  # a slower motion is one that nothing holds
-    omegas, columns = [], []
-    omega = found[vibrates]
+    vibrates, omegas, columns = pairs.resolved != 0.0, [], []  # others are motions that nothing holds
+    omega = np.abs(pairs.values[vibrates])
     # Of frequencies that are one any turn of the shapes is one.
     for group in np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > 1e-6 * omega[1:])):
         X = _real_span(system.comm, M, pairs.right[:, vibrates][:, group])

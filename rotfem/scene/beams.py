@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo
 from pydantic_core import PydanticCustomError
 
+from rotfem.places import apart
 from rotfem.scene.blades.deck import Asked, keys_of
 from rotfem.scene.files import existing_file
 from rotfem.scene.plates import PlateStructure
@@ -17,7 +18,7 @@ from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_
 from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.span_tables import OF_FILE, AnyProfile, FromFile
-from rotfem.scene.structure import Damping, StructureTable, apart, check_one_hub
+from rotfem.scene.structure import Damping, StructureTable, check_one_hub
 from rotfem.scene.table import SceneModel, Unit, along, problem, problems_at
 from rotfem.scene.values import (
     DIGITS,

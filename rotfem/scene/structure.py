@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from inspect import Parameter, signature
 from typing import Annotated, Any, ClassVar, TypeAlias
@@ -159,15 +159,6 @@ class Damping(SceneModel):
 
 
 # --- what structures share --------------------------------------------------------------------------------------------
-
-
-def apart(places: Collection[float], length: float) -> tuple[float, ...]:
-    """Return places along a beam (m) in order, but one of those that only round-off keeps apart, and no end."""
-    out, same = [0.0], 1e-7 * length
-    for x in sorted(places):
-        if x - out[-1] > same and length - x > same:
-            out.append(x)
-    return tuple(out[1:])
 
 
 class StructureTable(SceneModel):

@@ -18,6 +18,7 @@ from pydantic import ConfigDict, PlainValidator, ValidationError, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from rotfem.errors import show
+from rotfem.places import ONE
 from rotfem.registry import Registry
 from rotfem.scene.table import SceneModel, Unit, as_name, problem, problems_at
 
@@ -267,10 +268,17 @@ def on_span(x: float, length: float | None) -> bool:
 
 
 def check_profile_length(key: str, profile: Profile, length: float, slack: float = ROUND_OFF) -> None:
-    """Refuse a taper that does not end at the length (m), to a relative slack; the problem is at `key`."""
-    if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=slack):
-        reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {profile[-1][0]:.9g}"
+    """Refuse a taper that does not end at the length (m), to a relative slack, or has two rows in one place."""
+    if not isinstance(profile, tuple):
+        return
+    places = [row[0] for row in profile]
+    if not math.isclose(places[-1], length, rel_tol=slack):
+        reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {places[-1]:.9g}"
         raise problem(key, [list(row) for row in profile], reason)
+    closest, x = min(((after - before, after) for before, after in pairwise(places)), default=(length, length))
+    if closest <= ONE * length:
+        least = f"more than {ONE * length:.2g} m, 1e-7 of the length"
+        raise problem(key, x, f"is {closest:.2g} m beyond the row before; rows of a jump must be apart by {least}")
 
 
 Number = Annotated[float, PlainValidator(as_number)]

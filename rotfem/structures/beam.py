@@ -16,7 +16,8 @@ from mpi4py import MPI
 from rotfem.mechanics.bodies import RootSpring, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
-from rotfem.structures.meshes.plate_mesh import END, apart, beam_nodes
+from rotfem.places import ONE, apart
+from rotfem.structures.meshes.plate_mesh import beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative
@@ -66,7 +67,7 @@ class Beam(Structure):
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
-        near = self.length * END
+        near = self.length * ONE
         facets = [
             mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.abs(p[0] - x) < near)
             for x in (self.length, 0.0)

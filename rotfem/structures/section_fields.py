@@ -25,7 +25,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from numpy.polynomial import legendre
 
-from rotfem.structures.meshes.plate_mesh import END
+from rotfem.places import ONE
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def field_values(
     values = np.array(at(x, middle), dtype=np.float64).reshape(len(x), -1)
     corners = space.mesh.geometry.x[space.mesh.geometry.dofmap[:, AROUND[space.mesh.topology.cell_name()]]]
     ends = np.stack([corners[..., 0].min(axis=1), corners[..., 0].max(axis=1)], axis=1)
-    near = END * float(np.abs(ends).max(initial=0.0))
+    near = ONE * float(np.abs(ends).max(initial=0.0))
     first, last = (np.searchsorted(rows, end) for end in (ends[:, 0] + near, ends[:, 1] - near))
     xi, w = leggauss(5)  # exact for a taper of fourth degree times the fifth of polynomials
     inner = np.concatenate([leggauss(degree + i)[0] for i in (0, 1)])

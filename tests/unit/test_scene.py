@@ -325,6 +325,12 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"structure__hub_offset": [0, 0, 0]}, "structure.hub_offset", "unknown key"),
         ("planar", {"structure__section__EA": False}, "structure.section.EA", "must be a number greater than 0"),
         ("planar", {"structure__section__EA": [[0, 1], [9, 1]]}, "structure.section.EA", "it ends at 9"),
+        (
+            "planar",
+            {"structure__section__EA": [[0, 1], [5, 1], [5 + 1e-7, 2], [10, 2]]},
+            "structure.section.EA",
+            "apart",
+        ),
         ("planar", {"structure__type": "planar_baem"}, "structure.type", 'did you mean "planar_beam"?'),
         ("planar", {"structure": {}}, "structure.type", "required key is missing"),
         ("planar", {"structure": 3}, "structure", "must be a table"),

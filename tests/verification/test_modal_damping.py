@@ -71,6 +71,18 @@ def test_ratios_in_order(theory: str) -> None:
     np.testing.assert_allclose(result.damping, [0.01, 0.0, 0.6, 0.02, 0.0, 0.0, 0.0], rtol=0, atol=EXACT)
 
 
+def test_a_first_mode_far_below_the_others() -> None:
+    """A tip mass of 1e3 times the beam's: ω² = 3EI/(mL³), which is no motion that nothing holds, on a hub neither."""
+    heavy = beam([0.05], **{"structure.tip_mass": 1.2e4})
+    first = modes(heavy).rows[0]
+    assert first["frequency"] == pytest.approx(np.sqrt(3 * 1.4e4 / (1.2e4 * 1e3)), rel=2e-3)
+    assert first["damping"] == pytest.approx(0.05, rel=1e-6)
+    free = heavy.replace({"structure.damping": {}, "motion": HUB | {"hub_inertia": 1e12}})
+    rows = modes(free).rows
+    assert [row["label"] for row in rows[:2]] == ["rigid body", first["label"]]
+    assert rows[1]["frequency"] == pytest.approx(first["frequency"], rel=3e-3)
+
+
 def test_one_ratio_is_that_of_ten_modes() -> None:
     np.testing.assert_allclose(modes(beam(0.005, **{"modes.count": 12})).damping, [0.005] * 10 + [0.0] * 2, atol=EXACT)
 

@@ -49,6 +49,17 @@ def scene(elements: int, section: dict[str, Any] | None = None, **more: Any) -> 
     )
 
 
+def test_places_that_only_typing_keeps_apart_are_one_node() -> None:
+    """A row at x = 3.3333333 and a load that ends at 10/3: a short element between them made 2e-4 of round-off."""
+    x, found = LENGTH / 3, []
+    for row in (x, round(x, 7)):
+        loads = {"distributed": {"over_span": [[0.0, 0.0, 10.0], [x, 0.0, 10.0], [x, 0.0, 0.0], [LENGTH, 0.0, 0.0]]}}
+        section = {"EI": [[0.0, 1.4e4], [row, 1.4e4], [LENGTH, 2.0e4]]}
+        still = {"type": "constant", "speed": 0.0}
+        found.append(rotfem.run(scene(8, section, loads=loads, motion=still)).tip["u2"][-1])
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
+
+
 def frequencies(elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest frequencies (rad/s), and what is said of their error by the mesh."""
     rows = rotfem.modes(scene(elements), hint=None).rows[:3]

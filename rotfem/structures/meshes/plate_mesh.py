@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,19 +16,8 @@ from mpi4py import MPI
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
+from rotfem.places import ONE, apart
 from rotfem.structures.meshes.gmsh_file import BadMesh, read
-
-#: Part of the length within which a node is an end of the line.
-END = 1e-9
-
-
-def apart(places: Iterable[float], length: float) -> tuple[float, ...]:
-    """Return places along a line (m) in order, those apart that are its ends or one that is there already."""
-    out: list[float] = []
-    for x in sorted(places):
-        if min(x - (out[-1] if out else 0.0), length - x) > END * length:
-            out.append(x)
-    return tuple(out)
 
 
 def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
@@ -108,7 +97,7 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] 
     names = {name: i for i, name in enumerate(EDGES, start=1)}
     edges, tags = [], []
     for name, (axis, end) in EDGES.items():
-        at, near = (corners[0][axis], corners[1][axis])[end], END * (corners[1][axis] - corners[0][axis])
+        at, near = (corners[0][axis], corners[1][axis])[end], ONE * (corners[1][axis] - corners[0][axis])
         found = mesh.locate_entities_boundary(
             out, 1, lambda p, axis=axis, at=at, near=near: np.abs(p[axis] - at) < near
         )
