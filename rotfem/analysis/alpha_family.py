@@ -10,8 +10,8 @@ where a is an auxiliary acceleration, the memory of the scheme; Newmark is α_m 
 
 q_{n+1} = q_n + h v,    v_{n+1} = v_n + h a,    F̄(q, v, a; t_n + h/2) = 0,    q = (q_n + q_{n+1})/2, v likewise.
 
-What F̄ is the system says (`rotfem.equations.energy_balance`): of a linear theory F itself, whose quadratic energy the
-rule conserves; of a nonlinear one the mean stress of the step's ends and a discrete gradient do.
+F̄ is F itself in a linear theory, whose quadratic energy the midpoint rule conserves. In a nonlinear one it has the mean
+stress of the step's ends and a discrete gradient (`rotfem.equations.energy_balance`).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class AlphaFamily(Scheme):
     def jumped(self, state: State, change: Array) -> State:
         """Return the state whose auxiliary acceleration has jumped too.
 
-        It stands for q̈ at another instant than t, and does so after the jump; a fresh one would lag anew at every knot.
+        It stands for q̈ at another instant than t, also after the jump.
         """
         return state.changed(memory=state.memory + change)
 
@@ -89,8 +89,8 @@ class AlphaFamily(Scheme):
     def resized(self, new: State, old: State, h: float) -> State:
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
-        It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
-        order. Where a step grows by more than steps do it would be an extrapolation, and starts afresh.
+        It stands for q̈ at t + h (α_m − α_f), so it changes with h; without this a change of step would cost an order.
+        Beyond the largest growth of steps it is q̈.
         """
         last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
         if h > self.growth * last * (1 + 1e-9):
@@ -155,7 +155,7 @@ register(Newmark)
 
 @dataclass(frozen=True)
 class EnergyConserving(Scheme):
-    """Energy to round-off for as many steps as there are; nothing is damped, resolved or not."""
+    """Conserves the energy to round-off; nothing is damped, resolved or not."""
 
     name: ClassVar[str] = "energy_conserving"
     order: ClassVar[int] = 2

@@ -1,12 +1,11 @@
-"""States between steps: rows of a history at equal distances, wherever the steps of a march end.
+"""States between steps: rows of a history at equal distances, independent of the steps.
 
 Between two states all unknowns are the polynomials through what is known at both: through q and q̇ cubics, of order 4,
-and through q, q̇ and q̈ quintics, of order 6 (Hermite). So what is between is as good as the ends are. Cubics are those
-of schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise. Of other schemes they
-take the place of quintics where the accelerations are such noise, as those of a rod that is spun at once.
+and through q, q̇ and q̈ quintics, of order 6 (Hermite). Cubics are for schemes up to order 2, whose accelerations of
+unresolved vibrations are noise, and for other schemes where the accelerations are such noise.
 
-All unknowns have the same weights: what holds linearly between unknowns at both ends, as that a thin plate has no shear
-strain, holds in between. Otherwise small differences would be large forces there.
+All unknowns have the same weights, so linear relations between them at both ends, as zero shear strain of a thin plate,
+hold in between.
 
 The acceleration at the end of a march solves M δa = −F(q, v, a), with the factor of M at rest where that converges
 quickly: M of a structure changes little with its deflection.
@@ -30,14 +29,14 @@ CLOSE = 1e-9
 
 
 class RowTimes:
-    """Takes the steps of a march, and gives the states at multiples of an interval and at the end.
+    """Interpolates the steps of a march at multiples of an interval and at the end.
 
     Args:
         interval: from one row to the next, s.
         end: last time, s.
         order: of the scheme that steps.
         comm: MPI communicator of the processes that share the unknowns.
-        passed: rows there are already, without that at t = 0.
+        passed: number of rows so far, without that at t = 0.
     """
 
     def __init__(self, interval: float, end: float, order: int, comm: MPI.Comm, passed: int = 0):
@@ -85,7 +84,7 @@ def between(old: State, new: State, times: list[float], order: int, comm: MPI.Co
 
 
 def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
-    """Return the coefficients of q in a step, by powers of the share of it that has passed, (powers, unknowns).
+    """Return the coefficients of q in a step, by powers of (t − t_old)/h, (powers, unknowns).
 
     Args:
         old: state that the step starts from.
@@ -131,7 +130,7 @@ def derivatives(curve: Array, x: Array) -> list[Array]:
 def end_acceleration(system: Any, state: State) -> Array:
     """Return q̈ of F(q, q̇, q̈) = 0 at a state, a local dof array; the time is set, the state is written on return.
 
-    Eight corrections are made with the factor at rest, if each is a tenth of the last, until 1e-13 would be left.
+    Up to eight corrections are made with the factor at rest, while each is a tenth of the last, down to 1e-13.
     """
     a = state.a.copy()
     before, at_rest, left = np.inf, True, 8
@@ -151,6 +150,6 @@ def end_acceleration(system: Any, state: State) -> Array:
 def write_state(system: Any, state: State) -> None:
     """Write a state into a system whose time is set, with the acceleration that the equations give at it.
 
-    Forces at the root take it; without it they would not balance what the structure is accelerated by.
+    Forces at the root depend on it.
     """
     system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))

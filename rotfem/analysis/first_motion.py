@@ -1,4 +1,4 @@
-"""What a history starts with that does not start at rest: one of its modes, or velocities along a beam."""
+"""Initial motions: a mode, or velocities along a beam."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class FirstMotion:
-    """A mode that a structure is in at the start, or velocities; one of them is given.
+    """An initial mode or initial velocities; one of them is given.
 
     Attributes:
         mode: number of the mode about the state the history starts from, from 1; None of velocities.
@@ -65,8 +65,7 @@ class FirstMotion:
         """Return q and its three rates in the mode x, local dof arrays (4, n), and its patterns.
 
         The tip moves by one in the direction in which it moves most; then the rates are Re(λᵏ a x e^{iφ}), and the
-        patterns are M Re x and M Im x, owned unknowns (k, m), those that have 1 % of the kinetic energy. What is less
-        follows the others, as the stretch that the Coriolis force makes of bending.
+        patterns are M Re x and M Im x, owned unknowns (k, m), if they have 1 % of the kinetic energy.
 
         Raises:
             InputError: there is no such mode, or it does not move the tip.
@@ -95,9 +94,9 @@ class FirstMotion:
 def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
     """Return (q, q̇) of the nonlinear motion that a mode is of, local dof arrays.
 
-    The linear shape q₁ alone lacks what bending does to the structure in second order: its foreshortening, which the
-    axial stiffness makes far more of than there is energy in the mode. Its part in the patterns b_i = M x_i is
-    prescribed, and all else balances the inertia of the mode (d'Alembert) and what force was left at the state q₀,
+    The linear shape q₁ alone lacks the foreshortening by bending; the axial stiffness would give it far more energy
+    than the mode has. Its part in the patterns b_i = M x_i is prescribed; the rest is in equilibrium with the inertia
+    of the mode (d'Alembert) and the residual at the state q₀,
 
         F(q, q̇₁, q̈₁) + Σ μ_i b_i = F(q₀, 0, 0),    b_i·(q − q₀ − q₁) = 0.
 
@@ -144,7 +143,7 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
 def of_velocities(system: Any, rows: Any) -> Array:
     """Return q̇ (local dof array) of a beam whose axis has the velocities of rows (x, v1, v2, v3), linear between.
 
-    Its sections turn with the slope of the axis. What the clamp holds rests.
+    Its sections turn with the slope of the axis. Clamped unknowns rest.
     """
     structure, table = system.structure, np.array(rows, dtype=float)
     x = structure.V.tabulate_dof_coordinates()[:, 0]

@@ -8,10 +8,10 @@ ESDIRK4 has an explicit first stage, V_1 = v_n, A_1 = q̈_n, and five singly dia
 & Carpenter 2003, appendix C, the implicit part of ARK4(3)6L[2]SA): L-stable, stiffly accurate, of stage order two. All
 stages of steps of one length share one tangent.
 
-Radau IIA is L-stable; its three stages hang together (Hairer & Wanner 1996, section IV.5). With W = a⁻¹ a change dQ of
+Radau IIA is L-stable; its three stages are coupled (Hairer & Wanner 1996, section IV.5). With W = a⁻¹ a change dQ of
 the stages changes V by W dQ/h and A by W² dQ/h², so in the basis of W = T Λ T⁻¹ simplified Newton iterations fall into
-K + s C + s² M with s = λ/h: one real system and a complex one, for two conjugate λ (IV.8). M, C and K serve for as many
-steps as they are good for.
+K + s C + s² M with s = λ/h: one real system and a complex one, for two conjugate λ (IV.8). M, C and K are kept over
+steps while the iterations converge.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ C_ESDIRK = A_ESDIRK.sum(axis=1)
 
 @dataclass(frozen=True)
 class ESDIRK4(Scheme):
-    """Fourth order in smooth motions; what it does not resolve is damped within a few steps."""
+    """Fourth order in smooth motions; unresolved vibrations are damped within a few steps."""
 
     name: ClassVar[str] = "esdirk4"
     order: ClassVar[int] = 4
@@ -132,7 +132,7 @@ class Before:
 
 
 class Together(list[Stage]):
-    """The stages of a step, which change together.
+    """The coupled stages of a step.
 
     Args:
         stages: predictions that meet the formulas of the method.
@@ -147,13 +147,13 @@ class Together(list[Stage]):
             stage.q, stage.v, stage.a = self.arrays[:, i]
 
     def correct(self, dq: Array) -> None:
-        """Change q by dq (3, …), and the rates by what follows from it."""
+        """Change q by dq (3, …), and the rates with it."""
         self.arrays += self.rates.dot(dq).reshape(self.arrays.shape)
 
 
 @dataclass(frozen=True)
 class RadauIIA(Scheme):
-    """Fifth order in smooth motions; what it does not resolve is damped within a few steps."""
+    """Fifth order in smooth motions; unresolved vibrations are damped within a few steps."""
 
     name: ClassVar[str] = "radau5"
     order: ClassVar[int] = 5
@@ -166,7 +166,7 @@ class RadauIIA(Scheme):
         return state.changed(memory=None)
 
     def kinked(self, state: State) -> State:
-        """Return the state without the step before it: the next one is no continuation of that."""
+        """Return the state without the memory of the step before."""
         return self.start(state)
 
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
@@ -177,9 +177,9 @@ class RadauIIA(Scheme):
         return Stage(t, q, v, state.a, REAL / h, (REAL / h) ** 2)
 
     def solved(self, state: State, h: float, end: float, equations: Equations) -> list[Stage]:
-        """Return the stages, solved together: with the matrices at hand, or with new ones about where that has led.
+        """Return the stages, solved together with the present matrices, or with new ones at the last iterate.
 
-        Matrices are made anew three times, about the start where the iterations have led half a length away.
+        Matrices are computed up to three times; at the start of the step if an iterate is half a length away.
         """
         stages = Together([self.stage(i, state, h, end, ()) for i in range(self.stages)], h)
         if state.memory is not None:
@@ -210,12 +210,12 @@ class RadauIIA(Scheme):
         return new.memory.error if new.memory is not None else None
 
     def fallbacks(self) -> tuple[Scheme, ...]:
-        """Return schemes whose stages are solved one after the other, from farther away: the most exact one first."""
+        """Return schemes whose stages are solved one after the other, the most accurate first."""
         return ESDIRK4(), GeneralisedAlpha()
 
 
 def iterate(stages: Together, h: float, equations: Equations, linearised: Any, last: bool) -> float | None:
-    """Correct stages by simplified Newton iterations, until nothing is left; return the increment if that fails.
+    """Correct stages by simplified Newton iterations to round-off; return the increment if that fails.
 
     Args:
         stages: changed.

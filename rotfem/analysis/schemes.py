@@ -1,9 +1,8 @@
-"""What a time-stepping scheme is: stages, update maps, the history it keeps, its order and its error estimate.
+"""Time-stepping schemes: stages, update maps, memory, order and error estimate.
 
-The equations of motion F(q, v, a, t) = 0 are met at every stage. A stage says where (t), predicts q, v and a there, and
-by which maps a correction dq of q changes v and a; the scheme makes the state at the end of a step of its stages. So F
-never knows the scheme, what solves a stage never knows its coefficients, and whatever stands in q, the angle of a free
-hub too, is one unknown among others.
+The equations of motion F(q, v, a, t) = 0 hold at every stage. A stage has a time t, a prediction of q, v and a there,
+and ∂v/∂q and ∂a/∂q, by which a correction of q changes v and a. The scheme makes the state at the end of a step of its
+stages. So F does not depend on the scheme, and the solution of a stage not on its coefficients.
 """
 
 from __future__ import annotations
@@ -144,7 +143,7 @@ class Equations(Protocol):
     newton: Any
 
     def predicted(self, stage: Stage, state: State) -> Array:
-        """Return q of a stage as it would be if all turned with the clamp; its own q where that does not move."""
+        """Return the predicted q of a stage; where the clamp moves the last shape, turned with it."""
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve one stage of a step from a state.
@@ -157,7 +156,7 @@ class Equations(Protocol):
         """Return −F at a stage, zero at clamped unknowns; the owned part, of a free hub with that of its angle last."""
 
     def linearised(self, stage: Stage | None) -> Any:
-        """Return the equations linearised about a stage; of None those at hand, or None where they do not serve."""
+        """Return M, C and K at a stage; of None the present ones, or None if they may not be reused."""
 
 
 def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
@@ -173,8 +172,8 @@ def _difference_weights(*points: float) -> Array:
 class Scheme(ABC):
     """One time-stepping scheme; its dataclass fields are its parameters, keys of a scene's [time] table.
 
-    A scheme is registered as a class. It has a name, the order that is observed of it in q, and the number of stages;
-    it says its stages by `stage` and the state they end in by `finish`.
+    A scheme is registered as a class, with its name, its order in q and its number of stages. `stage` returns a stage,
+    `finish` the state at the end of a step.
     """
 
     registry: ClassVar[Registry[Any]] = registered
@@ -182,11 +181,11 @@ class Scheme(ABC):
     name: ClassVar[str]
     order: ClassVar[int]
     stages: ClassVar[int] = 1
-    #: Whether a step of a free hub starts with only as much of a jump of accelerations as it resolves (see `Stepper`).
+    #: Whether a step of a free hub starts with the part of a jump of accelerations that it resolves (see `Stepper`).
     filters_jumps: ClassVar[bool] = False
 
-    #: (C, m, s) of the error estimate C (ωh)^m A of a vibration of amplitude A, which grows as (s ωh)² A where it is
-    #: not resolved, and most by which a step may grow.
+    #: (C, m, s) of the `local_error` of a vibration of frequency ω and amplitude A: C (ωh)^m A where it is resolved,
+    #: (s ωh)² A where it is not. Largest ratio of two adaptive steps.
     estimate: ClassVar[tuple[float, int, float]] = (1 / 12, 3, 0.3)
     growth: ClassVar[float] = 2.0
 
@@ -236,19 +235,19 @@ class Scheme(ABC):
         return self.start(state)
 
     def kinked(self, state: State) -> State:
-        """Return a state after which what drives the motion goes on along another line, its acceleration the same."""
+        """Return a state at which a signal has a kink: its rate jumps, the acceleration does not."""
         return state
 
     def local_error(self, new: State, old: State) -> Array | None:
-        """Return an estimate of the error of q that the step from old to new made; None if there is none."""
+        """Return the estimated error of q of the step from old to new; None if there is none."""
         return None
 
     def fallbacks(self) -> tuple[Scheme, ...]:
-        """Return more robust schemes that take the steps that this one cannot, in the order they are tried."""
+        """Return more robust schemes for steps that this one cannot take, in the order they are tried."""
         return ()
 
     def resized(self, new: State, old: State, h: float) -> State:
-        """Return a state after which steps of another length h (s) follow than the one that led there from old."""
+        """Return the state for steps of another length h (s) than that of the step from old to new."""
         return new
 
     @classmethod
@@ -261,4 +260,4 @@ class Observer(Protocol):
     """An observer of the steps of a march."""
 
     def __call__(self, old: State, new: State, leg: Any) -> None:
-        """Take note of a step from an old to a new state, over a leg of the time grid (see `time_grid.Leg`)."""
+        """Observe a step from an old to a new state, over a leg of the time grid (see `time_grid.Leg`)."""

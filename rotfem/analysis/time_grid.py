@@ -1,10 +1,9 @@
-"""The time grid of a march: its steps, and how they meet the knots of everything that is prescribed.
+"""The time grid of a march: its steps, and the knots of prescribed data.
 
-Knots are the instants at which something prescribed, or its rate, may jump: rows of tables, ends of pulses, jumps of
-functions, and the breakpoints that a user names. A step of a scheme of second order with a knot inside sees every
-signal as the straight line with its mean and its first moment (see `rotfem.mechanics.time_signals`), which leaves an
-error of second order too. Schemes of higher order, and adaptive steps, take a step in legs from one knot to the next if
-there are few of them; with more they see lines as well.
+Knots are the instants at which a signal or its rate may jump: rows of tables, ends of pulses, jumps of functions, and
+`time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
+its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order. Schemes of higher order,
+and adaptive steps, take a step with few knots in legs from one to the next; with more they use lines as well.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from rotfem.mechanics.time_signals import TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
-#: Most knots in a step that are landed on; shortest leg of a step, and part of a step that is one instant.
+#: Most knots in a step at which legs end; shortest leg, and distance of equal instants, as parts of a step.
 FEW, SHORT, CLOSE = 4, 1e-3, 1e-9
 
-#: Jump, as a part of the largest value, that is located, and halvings after which it is one if half of it is left.
+#: Smallest change, as a part of the largest value, that is searched for a jump; halvings that confirm one.
 JUMP, SURE = 1e-3, 10
 
 
@@ -35,9 +34,9 @@ class Leg:
     Attributes:
         end: its last instant, s.
         length: s.
-        lands: whether it ends at a knot, where the next one goes on with the accelerations that hold after it.
-        line: begin and end (s) of what it sees signals as straight lines over; None for their values.
-        whole: whether the step ends with it.
+        lands: whether it ends at a knot; the next one starts with the accelerations after it.
+        line: begin and end (s) of the straight lines that replace the signals; None for their values.
+        whole: whether it ends its step.
     """
 
     end: float
@@ -48,14 +47,13 @@ class Leg:
 
     @property
     def finish(self) -> View:
-        """How it sees at its end what is prescribed."""
+        """How signals are evaluated at its end."""
         return View(-1 if self.lands else 0, self.line)
 
     def doubles(self, after: Leg) -> bool:
         """Return whether this leg and the one after it may be taken as one, in a step of about twice the length.
 
-        They have no knot in them or between, and none is longer than twice the other: a step as long as both has hardly
-        another error than one that is most of it.
+        There is no knot in them or between, and neither is longer than twice the other.
         """
         shorter, longer = sorted((self.length, after.length))
         return 2 * shorter >= longer * (1 - CLOSE) and not (self.lands or self.line or after.line)
@@ -65,7 +63,7 @@ class TimeGrid:
     """The legs of all steps.
 
     Args:
-        signals: what is prescribed.
+        signals: prescribed data.
         times: ends of the steps, the first the start of the march, s.
         step: nominal length of a step, s.
         breakpoints: further knots, s.
@@ -112,8 +110,8 @@ class TimeGrid:
 def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:
     """Add breakpoints (s) and jumps between the ends of steps (s) to the knots of a signal, where these are not known.
 
-    The change over a step is followed into the half where more of it is. That of a continuous function becomes less; of
-    a jump it is all there when the halves have no number between their ends.
+    By bisection: a large change over a step is followed into the half with more of it, down to neighbouring numbers. It
+    is a jump if it does not become smaller.
 
     Raises:
         InputError: it jumps and must not.

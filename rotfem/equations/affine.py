@@ -1,7 +1,7 @@
 """Linear theories: M a + C(t) v + K(t) q + f(t) = 0 with operators affine in (1, Omega, Omega², dOmega/dt, a_o, loads).
 
-The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs matrix sums. They say what they are of,
-so that a part can be taken by itself, or weighed.
+The pieces are assembled once (`rotfem.equations.pieces`); a new speed costs sums of matrices. Each has the names of its
+effects, so that effects can be left out.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class AffineSystem(System):
         return self._decomposed.assembler
 
     def _make_operators(self) -> None:
-        """Make M, C, K and f of a time, none of which is set yet."""
+        """Allocate M, C, K and f."""
         self._sums, self._operators = dict[str, Any](), dict[str, Any]()
         self._load = compat.create_vector(self.V)
         self._coefficients: Array | None = None
@@ -76,7 +76,7 @@ class AffineSystem(System):
         return other
 
     def check_terms(self) -> None:
-        """Refuse terms of a user that no linear theory can have.
+        """Refuse terms of a user that are no polynomials of the constants.
 
         Raises:
             InputError: one is no polynomial of second degree of the constants.
@@ -97,14 +97,14 @@ class AffineSystem(System):
         return {"F": forms.integral_count(self.model.residual), "J": count}
 
     def leave_out(self, effects: Collection[str]) -> None:
-        """Take the pieces of some effects, their bodies or the PRESTRESS out, and put all others back in."""
+        """Leave out the pieces of some effects, or the PRESTRESS, and include all others."""
         super().leave_out(effects)
         left_out = set(effects)
         self._weights = np.array([0.0 if left_out & p.of else 1.0 for p in self.pieces])
         self._coefficients = None
 
     def _factor_indices(self) -> npt.NDArray[np.int64]:
-        """Return for every piece the two places of its factors in (1, all constants one after the other)."""
+        """Return for every piece the indices of its two factors in (1, all constants one after the other)."""
         places: dict[tuple[str, int], int] = {}
         for name, constant in self._constants.items():
             for i in range(constant.value.size):
@@ -142,7 +142,7 @@ class AffineSystem(System):
                 self._load.axpy(value, operator)
 
     def coefficients(self, motion: Motion) -> Array:
-        """Return the factor of every piece at the start of another motion, shape (n,); nothing is set."""
+        """Return the factor of every piece at t = 0 of another motion, shape (n,), without setting it."""
         values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
         return self._products(np.concatenate([ONE, *(np.ravel(values[name]) for name in self._constants)]))
 
@@ -170,18 +170,18 @@ class AffineSystem(System):
         return ClampRows(self.pieces, len(self.root.names))
 
     def clamp_forces(self) -> Array:
-        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
+        """Return this process's part of the clamp's work in its unit motions (see `System`)."""
         assert self._coefficients is not None
         return self._at_clamp(self._coefficients, self._state)
 
     def clamp_tangents(self) -> tuple[Array, Array, Array]:
-        """Return what small q, v and a add to the forces of the clamp (see `System`)."""
+        """Return the derivatives of the forces of the clamp to q, v and a (see `System`)."""
         assert self._coefficients is not None
         return self._at_clamp.tangents(self._coefficients, len(self.root.weights))
 
     @property
     def current(self) -> bool:
-        """Whether the last tangent is that of this time, but for its shifts (see `System`)."""
+        """Whether M, C and K of the last tangent are those of this time (see `System`)."""
         return not self._changed
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
@@ -257,7 +257,7 @@ class AffineSystem(System):
         return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))
 
     def add_other_stiffness(self, A: Any) -> None:
-        """Add to a matrix the stiffness at the time set that is not that of the strains: of effects and prestress."""
+        """Add to a matrix the stiffness of effects and prestress at the time set."""
         assert self._coefficients is not None
         for p, value in zip(self.pieces, self._coefficients, strict=True):
             if p.kind == "K" and value != 0.0 and (INTERNAL.name not in p.of or PRESTRESS in p.of):

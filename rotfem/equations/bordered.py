@@ -4,8 +4,8 @@ Its equation is the virtual work of all effects in a rigid turn δx = e×x δpsi
 
     I_R psi'' + c psi' + (work in the turn) = M(t),
 
-so it holds the angular momentum of hub and structure, exactly and for every theory. Together with F(q, …) = 0 it is
-solved by block elimination, one factorisation for both right-hand sides.
+which is the balance of angular momentum of hub and structure, exactly and for every theory. Together with F(q, …) = 0
+it is solved by block elimination, with one factorisation for both right-hand sides.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from rotfem.structures.root_reaction import along_axis
 
 
 class HubRow:
-    """The hub's equation at the state that is written into a system, and its derivatives.
+    """The hub's equation and its derivatives at the state of a system.
 
     Args:
         system: equations of motion of the structure.
-        once: whether its forms are to be compiled in haste (see `rotfem.numerics.forms`).
+        once: whether its forms are compiled without optimisation (see `rotfem.numerics.forms`).
     """
 
     def __init__(self, system: System, once: bool = False):
@@ -81,11 +81,11 @@ class HubRow:
         return float(own + self.work() - self.torque(t))
 
     def torque(self, t: float, after: bool = False) -> float:
-        """Return M at time t (s) and the state, N·m; after a jump there if so wanted."""
+        """Return M at time t (s) and the state, N·m; after a jump there if wanted."""
         return self.hub.torque.on(t, self.seen, after)
 
     def seen(self) -> tuple[float, float, dict[str, float]]:
-        """Return psi (rad), psi' (rad/s) and the tip at the state, by the names of its components."""
+        """Return psi (rad), psi' (rad/s) and the unknowns at the tip by name: the arguments of a controller."""
         system, (psi, speed, _) = self.system, self.angle.values
         tip = system.tip(system.q.x.array, system.time)
         return float(psi), float(speed), dict(zip(system.structure.components, map(float, tip), strict=True))
@@ -118,11 +118,11 @@ class HubRow:
 
     @property
     def has_outside(self) -> bool:
-        """Whether there are forces that are no change of momentum."""
+        """Whether there are external forces."""
         return "outside" in self._forms
 
     def outside(self) -> float:
-        """Return the moment of all forces that are no change of momentum, with torque and brake left out (N·m)."""
+        """Return the moment of all external forces but torque and brake (N·m)."""
         return -self._value(self._forms["outside"]) if self.has_outside else 0.0
 
     def angular_momentum(self) -> float:
@@ -140,11 +140,11 @@ Array = npt.NDArray[np.float64]
 class BorderedSystem:
     """A system of a structure, bordered by the angle of its hub; unknowns are those of the structure, then psi.
 
-    What it does not say itself is that of the structure's system.
+    Attributes that it does not define are those of the structure's system.
 
     Args:
         inner: equations of motion of the structure, its model with a free hub.
-        once: whether the forms of the hub's equation are to be compiled in haste.
+        once: whether the forms of the hub's equation are compiled without optimisation.
     """
 
     solved_at_once = False
@@ -172,7 +172,7 @@ class BorderedSystem:
 
     @property
     def row(self) -> HubRow:
-        """The hub's equation, made anew where the structure's were."""
+        """The hub's equation, compiled again where the structure's were."""
         if self._row[0] != self.inner.compilations:
             coupled = self._row[1].coupled
             self._row = self.inner.compilations, HubRow(self.inner, self._once)
@@ -183,7 +183,7 @@ class BorderedSystem:
 
     @property
     def held(self) -> System:
-        """The system of the structure alone, its hub held."""
+        """The system of the structure alone, with the hub fixed."""
         return self.inner
 
     def zeros(self) -> Array:
@@ -206,11 +206,11 @@ class BorderedSystem:
         self.inner.set_time(self.inner.time)
 
     def driven(self, t: float) -> Array:
-        """Return all that is prescribed at time t (s), the torque last (see `System.driven`)."""
+        """Return all prescribed data at time t (s), the torque last (see `System.driven`)."""
         return np.append(self.inner.driven(t), self.row.torque(t))
 
     def leave_out(self, effects: Any) -> None:
-        """Switch effects off, all others on, and put the hub back to its start."""
+        """Switch effects off, all others on, and reset the hub to its start."""
         self.inner.leave_out(effects)
         self.row.coupled = "hub_coupling" in self.inner.model.effects and "hub_coupling" not in effects
         self.angle.start()
@@ -238,7 +238,7 @@ class BorderedSystem:
         return out
 
     def acceleration(self, at_rest: bool = False) -> Array:
-        """Return what is to be added to a so that the equations hold at the state (see `Solutions.acceleration`)."""
+        """Return the correction of a with which the equations hold at the state (see `Solutions.acceleration`)."""
         s, row = self.inner, self.row
         solver, massless = s.mass_solver(at_rest)
         r, R, b = -row.residual(s.time), s.residual(), s.spin_derivative(0.0, 1.0)
@@ -279,14 +279,14 @@ class BorderedSystem:
     # --- what is read of a state -------------------------------------------------------------------------------------
 
     def increment_size(self, dq: Array) -> float:
-        """Return the size of a correction by which Newton is judged, the angle's among them."""
+        """Return the scaled size of a correction, that of the angle included."""
         return max(self.inner.size(dq), abs(float(dq[-1])))
 
     def root_reaction(self) -> dict[str, float]:
         """Return force and moment of the hub on the structure (see `System`), in balance with the hub's equation.
 
-        That takes the work in a turn of the displaced structure, which the residual in a turn of the clamp is to the
-        order of the theory, or of the mesh where the theory is exact. The moment about the axis is the former.
+        The moment about the axis is the work in a rigid turn of the displaced structure. The residual in a turn of the
+        clamp differs from it by the order of the theory, or of the mesh if the theory is exact.
         """
         found = self.inner.root_reaction()
         if not self.row.coupled:
@@ -299,7 +299,7 @@ class BorderedSystem:
     def given(self, new: Any, old: Any = None) -> Array:
         """Return (work, impulse, moment) at the end of a step, by the trapezoidal rule over it, or of a first state.
 
-        The impulse of a torque that is prescribed is exact.
+        The impulse of a prescribed torque is exact.
 
         Work (J) is that of torque and brake; the angular impulse (N·m·s) has the moment (N·m) of all forces from
         outside in it too, which is kept for the next step.
@@ -326,7 +326,7 @@ class BorderedSystem:
         return float((new.t - old.t) * mean)
 
     def moment(self, state: Any) -> float:
-        """Return the moment of all forces from outside but torque and brake at a state (N·m)."""
+        """Return the moment of all external forces but torque and brake at a state (N·m)."""
         if not self.row.has_outside:
             return 0.0
         self.set_time(state.t)
@@ -345,8 +345,8 @@ class OverStep(BorderedSystem):
         self.inner = whole.inner.balance
 
     def begin(self, start: Any, end: float) -> None:
-        """Say where and when (s) a step starts and ends; the time of its middle is set."""
+        """Set start state and end (s) of a step; the time of its middle is set."""
         self.inner.begin(start.changed(q=start.q[:-1], v=start.v[:-1]), end)
 
     def finish(self, stage: Any) -> None:
-        """Return what the next step is to know of one that is solved: nothing."""
+        """Return the memory for the next step: none."""

@@ -1,14 +1,12 @@
-"""The clamp: what it does in its unit motions, and how it moves in a frame that does not turn with the hub.
+"""The forces of the clamp in its unit motions, and its motion in a frame that does not turn with the hub.
 
-Damping by mode and by mass, C v = B Bᵀ v and a0 M v, brakes the motion of all points of the structure relative to the
-hub. So its forces act between the two, as springs of the root do. What the hub exerts on the structure, in balance with
-its inertia and loads alone, is then what holds the clamp less the work of these forces when all of the structure goes
-along in a unit motion of the clamp:
+Damping by mode and by mass, C v = B Bᵀ v and a0 M v, acts between hub and structure, as springs of the root do. The
+reaction that balances inertia and loads alone is the constraint force less the work of these forces in a rigid motion:
 
     f_i = F(δq of the clamp) − (C v)·R_i(q),
 
-R_i the rigid motion of the displaced structure (`rotfem.structures.root_reaction`). Of a free hub that is its own
-equation, in which forces between it and its structure have no part.
+R_i the rigid motion of the displaced structure with the clamp (`rotfem.structures.root_reaction`). The equation of a
+free hub contains no forces between hub and structure.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ Index = npt.NDArray[np.int64]
 
 
 class ClampWork:
-    """The forces that hold the clamped unknowns, in the unit motions of `rotfem.structures.root_reaction`."""
+    """The constraint forces of the clamp, as work in the unit motions of `rotfem.structures.root_reaction`."""
 
     def __init__(self, system: Any):
         self._system, weights = system, system.root.weights
@@ -49,7 +47,7 @@ class ClampWork:
         self._held, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
 
     def __call__(self, residual: Array) -> Array:
-        """Return the part of this process in their work at the state set, (motions,), of F with its clamped rows."""
+        """Return this process's part of their work at the state set, (motions,), of F with its clamped rows."""
         system = self._system
         held = np.asarray(residual[system.clamped] @ self._motions) - self._damping()
         if not self._springs:
@@ -59,7 +57,7 @@ class ClampWork:
 
     @cached_property
     def _springs(self) -> list[Any]:
-        """The work of springs and dampers of the root, compiled; empty where it has none that unknowns move."""
+        """The work of springs and dampers of the root, compiled; empty without any."""
         terms = self._terms
         return [forms.form(added(terms), once=True)] if terms else []
 
@@ -94,7 +92,7 @@ class ClampWork:
         return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
 
     def _damping_tangent(self, M: Any) -> Array | float:
-        """Return what small velocities add to them, (owned unknowns, motions), of M with the rows of the clamp."""
+        """Return their derivatives to velocities, (owned unknowns, motions), of M with the rows of the clamp."""
         system, by_mode = self._system, self._system.by_mode
         mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
         if mass is None and by_mode is None:
@@ -108,7 +106,7 @@ class ClampWork:
         return out
 
     def _damping(self) -> Array | float:
-        """Return the part of this process in the work of these forces at the state set, (motions,); 0 of none."""
+        """Return this process's part of the work of the damping forces at the state set, (motions,); 0 without."""
         system, by_mode = self._system, self._system.by_mode
         if not self._by_mass and by_mode is None:
             return 0.0
@@ -140,7 +138,7 @@ def rows_times(A: Any, columns: Array) -> Array:
 
 
 class AtClamp:
-    """Says what an operator, its clamp not held, does in the unit motions of the clamp, of this process."""
+    """Products of operators, without the constraint, with the unit motions of the clamp, of this process."""
 
     def __init__(self, model: Model, clamped: npt.NDArray[Any], root: RootReaction):
         self._model = model

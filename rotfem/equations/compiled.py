@@ -21,10 +21,10 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     Args:
         problem: what is to be computed.
         comm: communicator the structure is distributed over.
-        moving: whether it will be stepped in time; a steady state and its modes do without what only that needs.
-        parted: whether effects will be left out, or it is for a trial of some hundred steps: forms are shared with
-            other nonlinear theories of the problem (see `NonlinearSystem`), and those of planar beams, whose steps
-            hardly feel it, compiled in haste.
+        moving: whether it will be stepped in time; steady states and modes need fewer forms.
+        parted: whether effects will be left out, or it is for some hundred steps. Forms are then shared with other
+            nonlinear theories of the problem (see `NonlinearSystem`), and those of planar beams compiled without
+            optimisation.
 
     Raises:
         InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
@@ -49,6 +49,6 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
 
 
 def with_all_unknowns(system: Any) -> Any:
-    """Return a system, or if some of its components are inactive that of all, at rest: stability is about all."""
+    """Return a system; if it has inactive components that with all of them, at rest, as stability depends on all."""
     problem = system.model.problem
     return compile_system(problem.replace(inactive=()), system.comm, moving=False) if problem.inactive else system

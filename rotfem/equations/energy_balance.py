@@ -1,18 +1,18 @@
-"""The equations of motion over a whole step, with the balance of energy kept to the last digit.
+"""The equations of motion over a whole step, with the balance of energy exact.
 
 A step from (q_0, v_0) to (q_1, v_1) is met at its middle, q = (q_0 + q_1)/2, q_1 − q_0 = h v, v_1 − v_0 = h a, by
 
     F̄(q, v, a; δq) + λ Δq·N δq = 0,    Δq = q_1 − q_0,
 
-where F̄ is F with the mean of the stresses at both ends, ½ C (Γ(q_0) + Γ(q_1)), in the place of those of the middle
-(Simo & Tarnow, Z. angew. Math. Phys. 43 (1992) 757): the middle of two turned configurations is shorter than both, and
-in a slender structure that would be a large force. Where strains are quadratic in q and the inertia is constant that
-alone keeps the energy. What is left, of third order in Δq, is put right by a discrete gradient (Gonzalez, J. Nonlinear
-Sci. 6 (1996) 449) of the whole residual: with H the energy that the conservative terms F^c of F̄ belong to,
+where F̄ is F with the mean of the stresses at both ends, ½ C (Γ(q_0) + Γ(q_1)), instead of those of the middle (Simo &
+Tarnow, Z. angew. Math. Phys. 43 (1992) 757): the middle of two rotated configurations is shorter than both, which would
+be a large force in a slender structure. With strains quadratic in q and constant inertia that conserves the energy. The
+remainder, of third order in Δq, is corrected by a discrete gradient (Gonzalez, J. Nonlinear Sci. 6 (1996) 449): with H
+the energy of the conservative terms F^c of F̄,
 
     λ |Δq|²_N = H(q_1, v_1) − H(q_0, v_0) − F̄^c·Δq,
 
-so H changes by the work of all other terms on Δq, and of the clamp, and by nothing else. N is the mass matrix of the
+so H changes by the work of all other terms and of the clamp on Δq alone. N is the mass matrix of the
 undeformed structure. H is the Jacobi integral for the spin, loads and base acceleration of the middle of the step. On a
 free hub, whose speed is an unknown, there is no such integral, and λ = 0.
 """
@@ -37,7 +37,7 @@ Array = npt.NDArray[np.float64]
 
 
 class EnergyBalance(Solutions):
-    """The equations of a nonlinear system over a step; what it does not say itself is that of the system."""
+    """The equations of a nonlinear system over a step; attributes that it does not define are those of the system."""
 
     keeps_factor = False
 
@@ -98,7 +98,7 @@ class EnergyBalance(Solutions):
 
     @cached_property
     def _work(self) -> Any:
-        """F of the terms that have no part in the energy, on Δq; None if there are none."""
+        """F of the terms without energy, on Δq; None if there are none."""
         terms = self.model.terms_without_energy()
         return forms.form(ufl.replace(sum(terms), {self._test: self._move})) if terms else None
 
@@ -110,7 +110,7 @@ class EnergyBalance(Solutions):
     # --- a step ------------------------------------------------------------------------------------------------------
 
     def begin(self, start: Any, end: float) -> None:
-        """Say where and when (s) a step starts and ends; the time of its middle is set."""
+        """Set start state and end (s) of a step; the time of its middle is set."""
         self._q_0, self._v_0, self._t_0, self._t_1 = start.q, start.v, start.t, end
         self._start.x.array[:] = start.q
         if self.model.hub is not None:
@@ -120,7 +120,7 @@ class EnergyBalance(Solutions):
         self._H_0 = self._H(start.q, start.v) if energy is None or not self.model.closed else energy
 
     def finish(self, stage: Any) -> tuple[float, float] | None:
-        """Return the energy at the end of a step that is solved, and what its balance lacks, for the next one (J)."""
+        """Return the energy at the end of a solved step and the defect of its balance, for the next one (J)."""
         if self.model.hub is not None:
             return None
         self.set_state(stage.q, stage.v, stage.a)
@@ -129,7 +129,7 @@ class EnergyBalance(Solutions):
         return H_1, self._due + self._H_0 + given - H_1
 
     def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
-        """Write the motion of the clamp: at the end of the step it is where it should be."""
+        """Write the motion of the clamp so that it is exact at the end of the step."""
         if self.system.clamp is None:
             return
         dofs, h = self.system.clamp.dofs, self._t_1 - self._t_0
@@ -138,7 +138,7 @@ class EnergyBalance(Solutions):
         a[dofs] = (v[dofs] - self._v_0[dofs]) * 2 / h
 
     def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
-        """Write the middle of the step, and with it its end, into what the forms are evaluated at."""
+        """Write the middle of the step, and with it its end, into the functions of the forms."""
         assert v is not None
         assert a is not None
         self._state = q, v, a

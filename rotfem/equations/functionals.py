@@ -38,7 +38,7 @@ class RigidBody(NamedTuple):
 
 
 def rigid_body(model: Model) -> RigidBody:
-    """Return the rigid body that the structure of a model is at rest, with all mass that its effects bring."""
+    """Return the integrals of the undeformed structure of a model, with the mass of its effects."""
     bodies = model.mechanics.bodies
     places = [b for b in bodies if b.is_position]
 
@@ -54,7 +54,7 @@ def rigid_body(model: Model) -> RigidBody:
 class Functionals:
     """Values of functionals, name ↦ UFL form, compiled as one form with a constant in every cell for each of them.
 
-    The unknowns of a cell are read once, and what functionals share is computed once.
+    Common subexpressions are computed once.
     """
 
     def __init__(self, parts: dict[str, Any], mesh: Any):

@@ -5,9 +5,9 @@ force of damping is C v with
 
     C = Σ_j 2 ζ_j ω_j (M φ_j)(M φ_j)ᵀ = B Bᵀ,
 
-for which φ_jᵀ C φ_k is 2 ζ_j ω_j where j = k and zero elsewhere (Wilson & Penzien 1972), so that these modes are damped
-with their ratios and no other mode at rest is. C is constant in the rotating frame: it is added to the equations of
-every theory, at every speed. It is of few columns but dense, and never written out (see `rotfem.numerics.projection`).
+so φ_jᵀ C φ_k is 2 ζ_j ω_j for j = k and zero else (Wilson & Penzien 1972): these modes have their ratios, all others at
+rest are undamped. C is constant in the rotating frame and in the equations of every theory, at every speed. It is
+dense, and kept as B (see `rotfem.numerics.projection`).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class ModesAtRest:
 def modes_at_rest(system: Any, count: int) -> ModesAtRest:
     """Return the first modes that vibrate, as many as wanted or as there are.
 
-    Shapes of equal frequency are turned so that each belongs to one family as far as that can be.
+    Shapes of equal frequency are combined so that each belongs to one family, if possible.
 
     Args:
         system: equations of motion of a structure, its hub held.
@@ -98,7 +98,7 @@ def _energies(comm: MPI.Comm, M: Any, X: Array) -> Array:
 
 
 def massed(M: Any) -> int:
-    """Return how many unknowns have a mass: as many modes there are, and infinite eigenvalues beyond them."""
+    """Return the number of unknowns with mass, which is that of finite eigenvalues."""
     return int(M.comm.tompi4py().allreduce(np.count_nonzero(M.getDiagonal().array)))  # M is positive semi-definite
 
 
@@ -144,7 +144,7 @@ class ByMode(LowRank):
 
 
 def damping_by_mode(system: Any) -> ByMode | None:
-    """Return what damping by mode adds to C of a system; None where there is none.
+    """Return the part of C of damping by mode; None without.
 
     Raises:
         InputError: there are not as many modes, or no such family, or the frame does not rotate.
@@ -203,6 +203,6 @@ def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
 
 
 def is_whole(system: Any) -> bool:
-    """Return whether a system has all effects there are; without rotary inertia there are no modes of torsion."""
+    """Return whether a system has all effects of its problem; without rotary inertia there are no modes of torsion."""
     problem = system.model.problem
     return set(system.model.effects) == set(problem.replace(effects=None).effective_effects())

@@ -58,15 +58,15 @@ class BySpin:
 class PointStresses:
     """Stresses of their own at the integration points, for the geometric part of Newton's tangent.
 
-    In a slender structure the stress of an iterate, C Γ(q), is nothing like that of the solution: a correction that
-    turns sections also stretches the axis, by half the square of the turn. EA makes a large force of that, of any sign,
-    which the next correction takes away. With the stresses as unknowns of their own (mixed integration point Newton:
-    Magisano, Leonetti & Garcea, Int. J. Numer. Meth. Eng. 112 (2017) 1237) a correction d of q_k gives
+    In a slender structure the stress of an iterate, C Γ(q), is far from that of the solution: a correction that rotates
+    sections also stretches the axis, by half the square of the rotation, which is a large spurious force by EA. With
+    the stresses as unknowns of their own (mixed integration point Newton: Magisano, Leonetti & Garcea, Int. J. Numer.
+    Meth. Eng. 112 (2017) 1237) a correction d of q_k gives
 
         σ_{k+1} = C (Γ(q_k) + DΓ(q_k)[d]),        q_{k+1} = q_k + d.
 
-    Eliminated point by point they leave the residual as it is. In the tangent ∫ σ_{k+1}·D²Γ takes the place of
-    ∫ C Γ(q_{k+1})·D²Γ. Both are the same where d is small, so the solution stays, and the order of convergence.
+    Eliminated point by point they do not change the residual. In the tangent ∫ σ_{k+1}·D²Γ replaces
+    ∫ C Γ(q_{k+1})·D²Γ. Both agree for small d, so solution and order of convergence are the same.
     """
 
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
@@ -76,12 +76,12 @@ class PointStresses:
         self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
 
     def come_from(self, before: Array) -> None:
-        """Say which q (local dof array) a correction led from to the one that is set."""
+        """Set the q (local dof array) from which the last correction started."""
         self._p[:] = before
         np.subtract(self._now, self._p, out=self._d)
 
     def change(self, trial: Any, c_v: Any = None) -> Any:
-        """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], a UFL form: what is to be added to K.
+        """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], the UFL form added to K.
 
         A viscous stress C η Γ̇ = C η DΓ(q)[v] is taken the same way, with DΓ(q_k)[v_{k+1}] + D²Γ(q_k)[v_k, d].
 
@@ -111,8 +111,8 @@ class NonlinearSystem(System):
     Args:
         model: the terms.
         moving: see `System`.
-        parted: whether what has the theory's strains is compiled by itself in a history. The rest, inertia and loads,
-            is most of the work, and that of another theory, too.
+        parted: whether terms with strains are compiled by themselves in a history. The rest, inertia and loads, is most
+            of the compilation, and shared with other theories.
 
     Attributes:
         signs: −1 of every local unknown, 0 where it is clamped.
@@ -163,7 +163,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _on_the_way(self) -> Any:
-        """The tangent with stresses of their own, compiled: of a system that is not moving K alone at v = a = 0."""
+        """The tangent with these stresses, compiled; of a system that is not moving K alone at v = a = 0."""
         trial = ufl.TrialFunction(self.V)
         if self.moving:
             change = self._stresses.change(trial, self._shifts[1] / self._shifts[0])
@@ -181,7 +181,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _parts(self) -> dict[str, Any]:
-        """F, and K, C and M, at v = a = 0, compiled, but for those that vanish."""
+        """F, K, C and M at v = a = 0, compiled, without those that vanish."""
         return self.model.derived_forms("at rest", self._made)[1]
 
     @property
@@ -224,11 +224,11 @@ class NonlinearSystem(System):
         return ClampWork(self)
 
     def clamp_forces(self) -> Array:
-        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
+        """Return this process's part of the clamp's work in its unit motions (see `System`)."""
         return self._at_clamp(self.sum_of(self._F))
 
     def clamp_tangents(self) -> tuple[Array, Array, Array]:
-        """Return what small q, v and a add to the forces of the clamp (see `System`)."""
+        """Return the derivatives of the forces of the clamp to q, v and a (see `System`)."""
         return self._at_clamp.tangents()
 
     def whole(self, kind: str) -> Any:

@@ -1,10 +1,8 @@
-"""The pieces of a linear theory: what f, K, C and M are with one product of constants at a time.
+"""The pieces of a linear theory: the coefficients of f, K, C and M as polynomials of the constants.
 
 f, K, C and M are the residual and its derivatives at the undeformed state, one form each with named constants: the
-switches of the terms and of the bodies, and those of frame and loads. So every term, part of the bodies and product of
-constants can be assembled by itself.
-
-What an effect adds to the strains is apart from the rest, so that it can be left out.
+switches of terms and bodies, and the constants of frame and loads. So every term, body and product of constants can be
+assembled by itself. The gains of effects in strains are pieces of their own, so that effects can be left out.
 """
 
 from __future__ import annotations
@@ -39,11 +37,11 @@ from rotfem.structures.root_reaction import RootReaction
 def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, theory: Theory) -> Any:
     """Return ∫ σ⁰·D²Γ[u, w] at rest, a UFL form: of N⁰ alone, or of all stress resultants (`Model.prestresses`).
 
-    It is 0 where no active component makes such forces.
+    It is 0 if no active component has such forces.
 
     Args:
         model: whose strains have the forces σ⁰.
-        state: the function q of its displacements (m, rad), and what σ⁰ is of in its place.
+        state: the function q (m, rad), and the displacement that σ⁰ belongs to.
         u: a displacement, or an argument of the form.
         w: another.
         theory: with the second-order strains Γ that σ⁰ works on.
@@ -61,7 +59,7 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
 
 
 def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -> Any:
-    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory."""
+    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with the exact strains Γ and the forces N of a linear theory."""
     s, out = model.structure, 0
     q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
     for strain in model.mechanics.strains:
@@ -73,7 +71,7 @@ def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -
 
 
 def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Piece, Any, frozenset[str]]]:
-    """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all."""
+    """Return (load piece, its nonzero geometric stiffness, the effect that adds it or none) of all."""
     switches = pieces.model.switches
     there = set(form.constants())
     adding = [name for name, switch in switches.items() if switch in there]
@@ -103,9 +101,9 @@ def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Pie
 
 
 def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
-    """Return the load pieces but those of loads of many pieces that all make no geometric stiffness.
+    """Return the load pieces that may have a geometric stiffness.
 
-    A load over the nodes of a mesh has a piece for each. If a random sum of them makes none, then each of them does.
+    A load at the nodes of a mesh has a piece for each; all are left out if a random sum of them has no stiffness.
     """
     of: dict[str, list[Piece]] = {}
     for p in (p for p in pieces.all if p.kind == "f"):
@@ -125,7 +123,7 @@ def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
 
 
 def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]:
-    """Return what each load displaces the linear structure by, local dof arrays."""
+    """Return the displacement of the linear structure under each load, local dof arrays."""
     if not loads:
         return []
     right = np.array([load.operator.array for load in loads]).T
@@ -150,17 +148,17 @@ Array = npt.NDArray[np.float64]
 #: A piece belongs to the product of these entries (constant name, component): () is 1, (("w", 0), ("w", 0)) is Omega².
 Key = tuple[tuple[str, int], ...]
 
-#: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
+#: Mark of the pieces of the geometric stiffness.
 PRESTRESS = "prestress"
 
 
 @dataclass
 class Piece:
-    """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and what it is of.
+    """One operator (PETSc matrix, or vector for "f"), with the constants whose product multiplies it.
 
     Attributes:
         of: names of the switches that must be on: the term, the effect of the bodies or of a gain in strain, PRESTRESS.
-        at_root: what it does in the unit motions of the clamp (see `RootReaction`), of this process: a row for each
+        at_root: its work in the unit motions of the clamp (see `RootReaction`), of this process: a row for each
             owned unknown, of "f" one number for each motion.
     """
 
@@ -184,7 +182,7 @@ class Pieces:
     Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md; or that of all its stress resultants.
 
     Args:
-        apart: whether effects will be left out, or told apart; else terms of the same constants are one piece.
+        apart: whether effects have pieces of their own; else terms of the same constants are one piece.
 
     Attributes:
         at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0, or what stands for it (`rotfem.numerics.forms.drawn`);
@@ -193,7 +191,7 @@ class Pieces:
         axis: components of the spin axis that w and dw have.
         assembler: makes matrices of the pattern of all.
         all: the pieces.
-        not_polynomial: names of terms that the pieces do not make up, as they are no polynomials of the constants.
+        not_polynomial: names of terms that are no polynomials of the constants.
         assembled: time spent on assembly, s.
         stiffness: a matrix for K of a time, zero, or the `material` where it was factorised.
         analysed: solver of this matrix, if the structure is large and effects are not apart.
@@ -249,7 +247,7 @@ class Pieces:
         return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
 
     def _narrow(self) -> None:
-        """Take out of the pattern what no matrix has: they are seen at constants, and a state, of no special size."""
+        """Remove zero entries from the pattern, found at random constants and a random state."""
         started, random = perf_counter(), np.random.default_rng(1)
         self._set_switches(self.model.switches)
         self._set_constants({e: random.uniform(0.5, 1.5) for name in self.constants for e in self._entries(name)})
@@ -276,7 +274,7 @@ class Pieces:
             switch.value = float(name in on)
 
     def _entries(self, name: str) -> list[tuple[str, int]]:
-        """Return the components of a constant that are ever there: w and dw keep to the axis if nothing pitches."""
+        """Return the components of a constant that may be nonzero: w and dw are along the axis if nothing pitches."""
         if name == "loads":
             return [entry for load in self.structure.load_constants for entry in self._entries(load)]
         n = self.constants[name].value.size
@@ -285,7 +283,7 @@ class Pieces:
         return [(name, i) for i in range(n)]
 
     def _keys(self, name: str) -> list[Key]:
-        """Return the products of constants that a term consists of: its effect says which, or any two that it has."""
+        """Return the products of constants of a term: those its effect declares, or any two of its constants."""
         declared = self.model.acting[name].constants
         if declared is not None:
             if not declared:
@@ -301,7 +299,7 @@ class Pieces:
         return [entry for known, c in self.constants.items() if c in mine for entry in self._entries(known)]
 
     def _is_checked(self, name: str) -> bool:
-        """Return whether a term is one of a user, or one of which no constants are declared."""
+        """Return whether a term is a user's, or has no declared constants."""
         effect = self.model.acting[name]
         models = name == "damping" and bool(self.model.mechanics.damping.models)
         return effect.constants is None or callable(effect.work) or models
@@ -342,10 +340,9 @@ class Pieces:
         self.assembled += perf_counter() - started
 
     def _is_made_up(self, kind: str, name: str, parts: Mapping[Key, Any]) -> bool:
-        """Return whether a term at constants of no special size is what these parts of it make there.
+        """Return whether a term at random constants equals the sum of its pieces there.
 
-        They are found with constants that are 0, 1 and −1, which determine a polynomial of second degree by its values;
-        c|v|v has values there too, but is none.
+        Pieces follow from values at 0, 1 and −1, which determine a polynomial of second degree; c|v|v is none.
         """
         values = {entry: 1.7 + 0.3 * i for i, entry in enumerate(self.entries_of(name))}
         left, same = self.assemble_at(kind, values), () if kind == "f" else (SAME,)
@@ -357,7 +354,7 @@ class Pieces:
         return bool(left.norm() <= 1e-10 * size)  # round-off of sums of some hundred numbers
 
     def _keep(self, kind: str, key: Key, operator: Any, of: frozenset[str]) -> None:
-        """Add a piece: what it does at the clamp apart, clamped rows and columns zero, or 1 in those of the strains."""
+        """Add a piece, with its work at the clamp; clamped rows and columns are zero, of the strains 1."""
         if kind == "f":
             at_root = self._at_clamp.of_vector(operator)
             operator.array[self.clamped] = 0.0
@@ -416,7 +413,7 @@ class Pieces:
 
     @cached_property
     def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1; hinges are held by springs, which N⁰ does not feel."""
+        """Stiffness of the strains alone, clamped rows 1; hinges have springs, which do not change N⁰."""
         return self.material_without(())
 
     @cached_property

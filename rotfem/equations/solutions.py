@@ -1,4 +1,4 @@
-"""What is solved with the matrices of a system: Newton's corrections, and the acceleration that balances a state."""
+"""Solutions with the matrices of a system: Newton's corrections, and the acceleration at a state."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Solutions:
         return self._timed(started, b, A, changed)
 
     def chord(self) -> Array:
-        """Return the correction of q at the state with the factor at hand."""
+        """Return the correction of q at the state with the present factor."""
         started = perf_counter()
         return self._timed(started, self.residual())
 
@@ -66,7 +66,7 @@ class Solutions:
         return dq
 
     def refactor(self, known: dict[str, Any] | None) -> None:
-        """Make the factor that is kept anew from what is known of it (see `factored`); nothing from None."""
+        """Compute the kept factor again from its data (see `factored`); do nothing of None."""
         if known is not None:
             self.count_rotations_from(known["reference"])
             self.set_time(known["t"])
@@ -94,10 +94,9 @@ class Solutions:
         return self.factored_before + (self._solver.factorisations if self._solver else 0)
 
     def acceleration(self, at_rest: bool = False) -> Array:
-        """Return what is to be added to a so that F = 0 at the state and time set: M δa = −F.
+        """Return the correction δa with which F = 0 at the state and time set: M δa = −F.
 
-        Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
-        acceleration keeps their equation in balance, K δa = 0 in their rows.
+        Unknowns without inertia (the rotation without rotary inertia) follow the others: K δa = 0 in their rows.
 
         Args:
             at_rest: whether M is taken of the undeformed structure, or of the reference; its factor is kept.
@@ -121,8 +120,8 @@ class Solutions:
     def _new_mass_solver(self) -> tuple[DirectSolver | SingularSolver, Array]:
         """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
 
-        A mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
-        then so little of K is added to all of M that no motion with inertia feels it.
+        A mass off the axis can leave a combination of rotations without inertia; then a multiple of K is added to M
+        that is negligible for all motions with inertia.
         """
         M = self.matrix(0.0, 0.0, 1.0, 1.0)
         none = M.getDiagonal()
@@ -143,8 +142,8 @@ class Solutions:
 class Linearised:
     """M, C and K of a system at the state and time set, and solutions with K + s C + s² M for several s.
 
-    Schemes whose stages hang together solve for all of them with such matrices, one for each eigenvalue of their
-    coefficients, complex ones among them; the matrices serve for as many steps as they are good for, of any length.
+    Schemes with coupled stages solve with one such matrix for each eigenvalue of their coefficients, complex ones among
+    them. The matrices are kept over steps of any length while iterations converge.
 
     Attributes:
         reference: what the rotations of the state are counted from.

@@ -3,11 +3,11 @@
 Stresses of finite elements are best at the Gauss points that also keep locking away: of elements of degree k the
 errors are O(h^(k+1)) there and O(h^k) elsewhere (Barlow, Int. J. Numer. Meth. Eng. 10 (1976) 243). A station has the
 value of the polynomial through the Gauss points of its cell and the nearest one on either side, of degree k + 1, and
-with it the order of the points. It does not reach over places where the section, the axis or a point load may make the
-forces jump; a station there has what is on its outer side, the tip what is on its inner one.
+with it the order of the points. It does not cross jumps of the forces by section, axis or point loads; a station there
+has the value of its outer side, the tip that of its inner side.
 
-The forces are derivatives of the stored energy to the strains of the section, ∂W/∂Γ and ∂W/∂K, so they are those about
-the reference axis, along the turned axes t_i, on a section whose outer part they are of: N > 0 is tension, and at the
+The forces are derivatives of the stored energy to the strains of the section, ∂W/∂Γ and ∂W/∂K: about the reference
+axis, along the turned axes t_i, of the outer part on the inner one. N > 0 is tension, and at the
 root of an undeformed beam they are −f and −m of the hub (`rotfem.structures.root_reaction`).
 
 Membrane forces n = h Q ε (N/m), shear forces q = k h G γ (N/m) and moments m = (h³/12) Q κ (N) of a plate are best at
@@ -46,7 +46,7 @@ def weights(points: Array, x: float) -> Array:
 
 
 class DampedStress:
-    """Adds to stress resultants what damping makes of them, where a state is written into a system.
+    """The stress resultants of damping at the state of a system.
 
     Kelvin–Voigt and the stiffness part of Rayleigh damping are stresses, η C Γ̇. Damping by mode is one of modes of the
     structure at rest, and so carried by the stresses that it has when it is displaced by
@@ -62,7 +62,7 @@ class DampedStress:
         self._compiled: tuple[int, Any] | None = None
 
     def compiled(self, expression: Callable[[], Any], points: Array) -> Any:
-        """Return an expression, compiled at points of the cells, made anew where rotations are counted otherwise."""
+        """Return an expression, compiled at points of the cells; again after a change of the reference rotation."""
         if self._compiled is None or self._compiled[0] != self._system.compilations:
             made = forms.expression(expression(), points, self._system.comm)
             self._compiled = self._system.compilations, made
@@ -73,11 +73,11 @@ class DampedStress:
         return sum(self._parts(force, self._system.v), start=force)
 
     def change(self, force: Any, dq: Any, dv: Any) -> Any:
-        """Return what small q and v about a state at rest, two functions, add to a resultant with damping."""
+        """Return the derivative of a resultant with damping about a state at rest by small q and v, two functions."""
         return sum(self._parts(force, dv), start=ufl.derivative(force, self._system.q, dq))
 
     def _parts(self, force: Any, v: Any) -> list[Any]:
-        """Return what damping adds to a resultant at velocities v, a function, and those of `update`."""
+        """Return the parts of damping in a resultant, at velocities v, a function, and those of `update`."""
         viscosity, q, out = self._system.model.mechanics.damping.stiffness, self._system.q, list[Any]()
         if viscosity is not None:
             out.append(viscosity * ufl.derivative(force, q, v))
@@ -87,7 +87,7 @@ class DampedStress:
         return out
 
     def update(self, v: Array) -> None:
-        """Take the velocities of the owned unknowns; all processes come here together."""
+        """Set the velocities of the owned unknowns; collective."""
         if self._displaced is not None:
             w, part = self._displaced.x, self._system.by_mode
             w.array[: len(part.B)] = part.displaced(v[: len(part.B)])
@@ -95,7 +95,7 @@ class DampedStress:
 
 
 class Stations:
-    """What a beam, of a system with its hub held, has at its stations (m, increasing).
+    """Section forces, strains and unknowns of a beam at its stations (m, increasing); the hub is fixed.
 
     Attributes:
         names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad).
@@ -209,7 +209,7 @@ class Stations:
 
 
 class StationChanges(Stations):
-    """What small motions about an equilibrium, written into the system, add to what a beam has at its stations."""
+    """Derivatives of the quantities at the stations of a beam about an equilibrium of its system."""
 
     def __init__(self, system: Any, positions: tuple[float, ...]):
         super().__init__(system, positions)
@@ -246,7 +246,7 @@ def von_mises(values: Array, thickness: Array) -> Array:
 
 
 class PlateResultants:
-    """What a plate carries: the system is that of the plate, its hub held.
+    """Stress resultants of a plate; the hub is fixed.
 
     Attributes:
         names: of all quantities.

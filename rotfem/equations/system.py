@@ -37,7 +37,7 @@ Array = npt.NDArray[np.float64]
 
 
 def forget(owner: Any) -> None:
-    """Make an object compute all its cached properties anew when they are next asked for."""
+    """Delete the cached properties of an object."""
     for name in list(vars(owner)):
         if isinstance(getattr(type(owner), name, None), cached_property):
             del vars(owner)[name]
@@ -56,21 +56,20 @@ class System(Solutions, ABC):
         q, v, a: dolfinx functions that hold the state the forms are evaluated at.
         linear: whether its theory is linear in q.
         solved_at_once: whether one solution of a step is exact.
-        settled: whether M, C and K are those of the time before; a linear theory may know they are.
+        settled: whether M, C and K are those of the time before; known of linear theories alone.
         scale: size of each local unknown (m or 1), by which increments are judged.
         clamp: motion of the clamp, where the frame does not rotate with it.
         root: rigid motions of what is clamped, which forces and moments at the root work on.
-        signals: what is prescribed and changes with time.
-        view: how these are seen.
+        signals: prescribed data that change with time.
+        view: how they are evaluated (`rotfem.mechanics.time_signals`).
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
-        plain: whether tangents do without what is known of the way to a state (see `PointStresses`), which takes a form
-            of its own.
-        analysed: a solver with a symmetric matrix of the pattern, of which others can use the ordering; None at first.
+        plain: whether tangents are without `PointStresses`, which need a form of their own.
+        analysed: a solver with a symmetric matrix of the pattern, whose ordering others use; None at first.
         left_out: effects that are switched off.
-        by_mode: the part of C that is damping by mode; None without, and where damping is left out.
+        by_mode: the part of C by mode; None without, and where damping is left out.
         assembler: makes matrices of the pattern of all tangents.
-        compilations: how often the forms were made; once, or twice where rotations have become very large.
+        compilations: of the forms: 1, or 2 after a change of the reference rotation.
     """
 
     model: Model
@@ -108,13 +107,13 @@ class System(Solutions, ABC):
         self.assembler = self._compile()
         self.A = self.assembler.pattern
         self._by_mode = self.by_mode = damping_by_mode(self)
-        #: Whether a factor is kept for the steps that follow, where factorising is dear: soon of a plate's matrix.
+        #: Whether a factor is kept over steps: where a factorisation takes much longer than a solution.
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
     def twin(self) -> Self:
         """Return another system of the same forms, functions and constants, with matrices and a factor of its own.
 
-        Two marches may take turns: each writes its state and time before it reads anything.
+        Two marches may alternate: each writes its state and time before it reads anything.
         """
         other = copy(self)
         vars(other).pop("balance", None)
@@ -126,7 +125,7 @@ class System(Solutions, ABC):
     def count_rotations_from(self, reference: Any) -> None:
         """Count rotations from a reference (`rotfem.structures.reference_rotation`), None for the undeformed structure.
 
-        The first time all forms are made anew, with the reference in them; set_time must follow then.
+        The first time all forms are compiled again, with the reference in them; `set_time` must follow.
         """
         turns = self.structure.turns
         if reference is not None and self._by_mode is not None:
@@ -153,7 +152,7 @@ class System(Solutions, ABC):
         return None if self.structure.turns is None else self.structure.turns.reference
 
     def check_reach(self, q: Array, time: float | None = None) -> None:
-        """Refuse rotations in q (local dof array) that have come too far from what they are counted from.
+        """Refuse rotations in q (local dof array) that are too far from their reference.
 
         Raises:
             BeyondReach: they have.
@@ -171,7 +170,7 @@ class System(Solutions, ABC):
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows.
 
-        With the q from which a correction has led to the state it may be another one that leads on better.
+        Given the q before the last correction, its geometric part may have other stresses (see `PointStresses`).
         """
 
     @abstractmethod
@@ -193,7 +192,7 @@ class System(Solutions, ABC):
 
     @property
     def current(self) -> bool:
-        """Whether the last tangent is that of this time, but for its shifts; a linear theory may know it is."""
+        """Whether M, C and K of the last tangent are those of this time; known of linear theories alone."""
         return False
 
     def leave_out(self, effects: Collection[str]) -> None:
@@ -219,7 +218,7 @@ class System(Solutions, ABC):
 
     @property
     def held(self) -> System:
-        """The system of the structure alone, its hub held."""
+        """The system of the structure alone, with the hub fixed."""
         return self
 
     def zeros(self) -> Array:
@@ -274,7 +273,7 @@ class System(Solutions, ABC):
         return values
 
     def driven(self, t: float) -> Array:
-        """Return all that is prescribed at time t (s) as it is seen now, one after the other."""
+        """Return all prescribed data at time t (s) in the present view, one after the other."""
         values = {**self.model.frame.values(self.motion, t), **self.load_values(t, self.motion)}
         clamp = () if self.clamp is None else self.clamp.at(t)
         return np.concatenate([np.ravel(v) for v in (*values.values(), *clamp)] or [np.empty(0)])
@@ -317,7 +316,7 @@ class System(Solutions, ABC):
         return matrices
 
     def given(self, new: Any, old: Any = None) -> Array | None:
-        """Return work, impulse and moment at the end of a step from an old to a new state; see the bordered system."""
+        """Return work, impulse and moment at the end of a step; None without a free hub (see `BorderedSystem`)."""
         return None
 
     # --- readings of a state, the same on every process -----------------------------------------------------------
@@ -329,11 +328,11 @@ class System(Solutions, ABC):
 
     @abstractmethod
     def clamp_forces(self) -> Array:
-        """Return the part of this process in what the clamp does in its unit motions at the state and time set."""
+        """Return this process's part of the clamp's work in its unit motions at the state and time set."""
 
     @abstractmethod
     def clamp_tangents(self) -> tuple[Array, Array, Array]:
-        """Return what small q, v and a of the owned unknowns add to `clamp_forces` about an equilibrium that is set.
+        """Return the derivatives of `clamp_forces` to q, v and a of the owned unknowns at an equilibrium that is set.
 
         Three arrays (unknowns, motions), of K, C and M.
         """
@@ -417,7 +416,7 @@ class System(Solutions, ABC):
         return {name: forms.form(form) for name, form in self.model.outputs().items()}
 
     def compile_readings(self) -> None:
-        """Compile what is read of states, energies and outputs, which is otherwise done when first asked for."""
+        """Compile energies and outputs, which are otherwise compiled when first used."""
         _ = self._energies, self._outputs
 
     def total(self, form: Any) -> float:

@@ -2,7 +2,7 @@
 
 A value, a table over the span and a harmonic have one shape, a table over time one for every component, a table over
 span and time one for every station and component. A linear theory assembles one piece for every shape. A function of
-place and time takes the nodes of the mesh for stations (`PlaceLoad`).
+place and time is evaluated at the nodes of the mesh (`PlaceLoad`).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Shapes:
-    """Some shapes with common stations: linear between them, nothing outside.
+    """Shapes with common stations: linear between them, zero outside.
 
     Attributes:
         values: of the shapes at the stations, (shapes, stations, components); (shapes, 1, components) without stations.
-        x: stations along the span (m), increasing; one that stands twice is a jump. None: the same everywhere.
-        region: name of the only region of the mesh where they are; "" everywhere.
+        x: stations along the span (m), increasing; twice the same is a jump. None: uniform.
+        region: name of the region of the mesh where they act; "" everywhere.
     """
 
     values: Array
@@ -57,7 +57,7 @@ class Shapes:
 
         Args:
             x: places along the span, m.
-            towards: places on the side of each from which a jump is seen, as the middles of their cells.
+            towards: places on the side of each whose value is taken at a jump, as the middles of their cells.
         """
         if self.x is None:
             return np.repeat(self.values, len(x), axis=1)
@@ -78,10 +78,10 @@ class Term:
     Attributes:
         shapes: s_k.
         amplitudes: times (n,) ↦ a_k, shape (n, k); None where all are 1 at all times.
-        knots: times (s) between which they are smooth, as far as they are known.
+        knots: known times (s) between which they are smooth.
         linear: whether they are linear between knots.
-        largest: largest size of each; None where that is not known. Not asked for where all are 1.
-        phase: of a harmonic (rad); None of anything else.
+        largest: largest absolute value of each; None where unknown, or where all are 1.
+        phase: of a harmonic (rad); else None.
     """
 
     shapes: Shapes
@@ -93,7 +93,7 @@ class Term:
 
     @classmethod
     def table(cls, rows: npt.ArrayLike, shapes: Shapes) -> Term:
-        """Return amplitudes that are given by rows (t, a…), linear between them and constant outside."""
+        """Return the term with amplitudes by rows (t, a…), linear between them and constant outside."""
         table = np.asarray(rows, dtype=float)
         t, values = np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1:])
         if not np.any(np.ptp(values, axis=0)):
@@ -142,8 +142,8 @@ class Load:
     Attributes:
         kind: "dead" keeps its direction in the frame, "follower" turns with the section.
         terms: of the sum.
-        seen: time (s) ↦ what `at` returns for the sum, as a march sees it (`rotfem.mechanics.time_signals`).
-        unpitched: the load in the frame of the hub, where this one is in that of a blade that pitches.
+        seen: time (s) ↦ amplitudes as a march evaluates them (`rotfem.mechanics.time_signals`); None for their values.
+        unpitched: the load in the frame of the hub, if this one is in that of a pitching blade.
     """
 
     kind: str
@@ -153,7 +153,7 @@ class Load:
 
     @cached_property
     def is_uniform(self) -> bool:
-        """Whether it is the same everywhere; its amplitudes are its components then."""
+        """Whether it is uniform; its amplitudes are then its components."""
         return all(term.shapes.is_uniform for term in self.terms)
 
     @cached_property
@@ -174,7 +174,7 @@ class Load:
 
     @cached_property
     def linear(self) -> bool:
-        """Whether it is linear between its knots; otherwise it has to be sampled."""
+        """Whether it is linear between its knots."""
         return all(term.linear for term in self.terms)
 
     @cached_property
@@ -184,7 +184,7 @@ class Load:
 
     @cached_property
     def jumps(self) -> tuple[float, ...]:
-        """Those of them (m) at which it may jump: stations that stand twice, and ends, beyond which it is nothing."""
+        """Stations (m) at which it may jump: double ones, and the ends."""
         tables = [term.shapes.x for term in self.terms if term.shapes.x is not None]
         return tuple(sorted({float(v) for x in tables for v in (x[0], *x[1:][np.diff(x) == 0.0], x[-1])}))
 
@@ -205,7 +205,7 @@ class Load:
 
 
 class ConstantLoad(Load):
-    """A load that does not change with time and is the same everywhere.
+    """A constant, uniform load.
 
     Args:
         value: components, N, N/m, N/m² or N·m, or as "2 kN".
@@ -224,7 +224,7 @@ class PlaceLoad:
     Attributes:
         kind: see `Load`.
         function: (place, t) ↦ components (components,); place is x (m) along a beam, (x, y) on a plate.
-        probes: places at which it is sampled to see how it changes with time.
+        probes: places at which it is sampled to find its knots.
         constant: whether it does not change with time.
         knots: times (s) between which it is smooth, as far as they are known.
         unpitched: see `Load`.
@@ -253,7 +253,7 @@ class PlaceLoad:
         return np.array([self.at(float(s)) for s in t])
 
     def sizes(self) -> None:
-        """Return None: it is not known how large it becomes."""
+        """Return None: no bound is known."""
         return
 
 
@@ -262,7 +262,7 @@ AnyLoad: TypeAlias = Load | PlaceLoad
 
 @dataclass(frozen=True)
 class PointLoads:
-    """What works at one place of the structure.
+    """Force and moment at one place of the structure.
 
     Attributes:
         x: along a beam (m), or (x, y) on a plate.
@@ -290,7 +290,7 @@ class Loads:
         distributed: force per length of a beam, N/m, or per area of a plate, N/m².
         distributed_moment: moment per length of a beam, N.
         pressure: force per area along the normal of a plate, N/m²: one component.
-        at: what works at places along the structure.
+        at: forces and moments at places of the structure.
     """
 
     gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -315,16 +315,16 @@ class Loads:
 
     @property
     def stations(self) -> set[float]:
-        """Places along the structure (m) at which loads have kinks or jumps, or work at a point."""
+        """Places along the structure (m) of kinks, jumps and point loads."""
         return {x for load in self.named.values() for x in load.stations} | self.jumps
 
     @property
     def jumps(self) -> set[float]:
-        """Those of them at which loads jump or work at a point."""
+        """Places along the structure (m) of jumps and point loads."""
         return {x for load in self.named.values() for x in load.jumps} | {p.x[0] for p in self.at if len(p.x) == 1}
 
     def replaced(self, changed: Mapping[str, AnyLoad]) -> Loads:
-        """Return the loads with other ones in the place of those of some names (see `named`)."""
+        """Return the loads with some of them replaced, by name (see `named`)."""
         points = tuple(
             replace(p, **{part: changed.get(f"at.{i}.{part}", getattr(p, part)) for part in ("force", "moment")})
             for i, p in enumerate(self.at)

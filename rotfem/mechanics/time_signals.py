@@ -1,12 +1,12 @@
-"""What is prescribed over time, and how a march sees it: from one side of an instant, or as a straight line.
+"""Signals: prescribed data over time, evaluated on one side of an instant, or as a straight line over a step.
 
-Speed, base acceleration, torque and loads are *signals*, smooth between their knots. A march lands on knots, and there
-a signal has two values: that of the step that ends, t⁻, and that of the step that starts, t⁺. Where knots are closer
-than steps, a step [a, b] sees the straight line with the mean and the first moment that the signal f has over it,
+Speed, base acceleration, torque and loads are signals, smooth between their knots. At a knot a signal has two values:
+that of the step that ends, t⁻, and that of the step that starts, t⁺. If knots are closer than steps, a signal f is
+replaced over a step [a, b] by the straight line with its mean and first moment,
 
     f̄(t) = ∫ f(s) ds / h + 12 (t − m)/h³ ∫ (s − m) f(s) ds,    h = b − a,    m = (a + b)/2,
 
-its best approximation in the sense of least squares: no impulse is lost, and none comes at another time.
+its best approximation in the sense of least squares, with the impulse of f.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[np.float64]
 
-#: Two times that are closer than this, relative to themselves, are one.
+#: Relative distance of two times below which they are equal.
 SAME = 1e-13
 
 #: Gauss points and weights on (0, 1): exact for polynomials of degree 5.
@@ -35,11 +35,11 @@ POINTS, WEIGHTS = 0.5 + 0.5 * np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.arra
 
 @dataclass
 class View:
-    """How the signals of a problem are seen at present.
+    """How the signals of a problem are evaluated at present.
 
     Attributes:
         side: −1 just before the time asked for, 1 just after it, 0 at it.
-        line: begin and end (s) of the step over which they are straight lines; None for their values.
+        line: begin and end (s) of the step over which they are replaced by straight lines; None for their values.
     """
 
     side: int = 0
@@ -51,13 +51,13 @@ class TimeSignal:
     """One quantity over time.
 
     Attributes:
-        name: what it is; of what must not jump its key, for messages. No two have the same.
+        name: unique; the key in messages, where it must not jump.
         at: time (s) ↦ value, scalar or shape (components,).
         knots: times (s) at which it or its rate may jump, increasing.
         smooth: further times (s) between which it is a polynomial, or nearly one.
         many: the same of an array of times, shape (n, components); made of `at` if None.
-        known: whether all knots are known; otherwise it is a function whose jumps are to be found.
-        continuous: whether it must not jump, as no force is large enough for that.
+        known: whether all knots are known; else jumps are searched.
+        continuous: whether it must not jump, as speeds and angles.
     """
 
     name: str
@@ -90,7 +90,7 @@ class TimeSignal:
         return mean + (t - middle) * slope
 
     def seen(self, view: View) -> Callable[[float], Any]:
-        """Return the signal as a function of time that shows what a view shows."""
+        """Return the signal as a function of time, evaluated as a view says."""
 
         def at(t: float) -> Any:
             if view.line is not None:
@@ -102,7 +102,7 @@ class TimeSignal:
 
 @dataclass(frozen=True)
 class SeenTorque(Torque):
-    """A torque as a view shows it."""
+    """A torque, evaluated as a view says."""
 
     seen: Callable[[float], float] = float
 
@@ -112,7 +112,7 @@ class SeenTorque(Torque):
 
 
 def viewed(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
-    """Return the problem whose signals are seen as a view shows them, and those that change with time."""
+    """Return the problem with signals that are evaluated as a view says, and those that change with time."""
     signals: list[TimeSignal] = []
 
     def see(signal: TimeSignal) -> Callable[[float], Any]:
@@ -126,7 +126,7 @@ def viewed(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
 
 
 def _viewed_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:
-    """Return a load as a view shows it; a function of place at every place, with the knots found at its probes."""
+    """Return a load, evaluated as a view says; a function of place with the knots found at its probes."""
     signal = TimeSignal(name, load.at, _times(load.knots), many=load.many, known=load.linear)
     sampled = see(signal)
     if not isinstance(load, PlaceLoad):
@@ -164,7 +164,7 @@ def _viewed_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float],
 
 
 def _viewed_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Pitch:
-    """Return a pitch as it is seen; neither the angle nor its rate may jump."""
+    """Return a pitch, evaluated as a view says; neither the angle nor its rate may jump."""
     changes = dict[str, Any]()
     for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):
         signal = TimeSignal(key, at, _times(pitch.knots), known=pitch.known, continuous=name != "acceleration")

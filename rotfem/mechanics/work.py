@@ -1,4 +1,4 @@
-"""The virtual work of every effect, stated once for a free variation of the motion.
+"""The virtual work of every effect, for any variation of the motion.
 
 The absolute acceleration of a point x of the frame is (theory section 1)
 
@@ -50,7 +50,7 @@ class RigidTurn:
 
 
 class Place:
-    """x in the place of its variation: what the work of a force or a spring is then, is linear or square in x."""
+    """x instead of its variation, for potentials of forces and springs."""
 
     within_frame = True
 
@@ -61,16 +61,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Mechanics:
-    """What effects act on.
+    """The quantities of which effects write their work.
 
     Attributes:
         bodies: all mass, part by part.
-        strains: what stores the energy.
+        strains: with the stored energy.
         loads: applied forces and moments.
         k: the unknowns and their rates.
         frame: w, dw, a_o and gravity.
         damping: coefficients.
-        structure: the discretised structure, for what else an effect wants of it (measures, fields, the position).
+        structure: the discretised structure: measures, fields, the position.
     """
 
     bodies: list[Body]
@@ -96,7 +96,7 @@ class Mechanics:
         return strain.force(strain.value)
 
     def springs(self) -> list[RootSpring]:
-        """Return what holds the hinges of the root.
+        """Return the springs and dampers of the root's hinges.
 
         The turns are those from the hub: in a frame that does not rotate less its angle, in one that pitches flap and
         lag about axes that do not.

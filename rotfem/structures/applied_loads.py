@@ -1,8 +1,8 @@
-"""The loads of a structure in its forms: the work of each, and the constants or fields that their amplitudes are.
+"""The amplitudes of loads in the forms: constants and fields.
 
-The force (or moment) of a load in the forms is f = Σ_k a_k s_k (see `rotfem.mechanics.loads`). Of a uniform load the
-amplitudes are the components of a constant; of any other one the factors of shapes, whose sum is a field, linear in
-each cell; of a function of place the values at the nodes of the mesh.
+The force (or moment) of a load in the forms is f = Σ_k a_k s_k (`rotfem.mechanics.loads`). The amplitudes of a uniform
+load are the components of a constant, those of a load over the span the factors of shapes, whose sum is a field. A
+function of place has its values at the nodes as amplitudes.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ Array = npt.NDArray[np.float64]
 
 
 class Amplitude:
-    """The components of a vector that is the same everywhere: a constant of the forms.
+    """The components of a uniform vector: a constant of the forms.
 
     Attributes:
-        follows_nodes: whether these are values at the nodes of the mesh, not amplitudes of the load itself.
+        follows_nodes: whether the amplitudes are values at the nodes of the mesh.
         dead: whether it keeps its direction in the frame of the hub.
-        value: the amplitudes, the same on every process; what is written there holds after `update`.
+        value: the amplitudes, the same on every process; they take effect by `update`.
         vector: the force in the forms.
     """
 
@@ -44,7 +44,7 @@ class Amplitude:
         return np.asarray(turn[:n, :n] @ value) if n > 1 else value
 
     def update(self, turn: Array | None = None) -> None:
-        """Do nothing: what is written to a constant holds."""
+        """Do nothing: the value of a constant is already set."""
 
 
 class SpanField(Amplitude):
@@ -109,7 +109,7 @@ class SpanField(Amplitude):
         return value
 
     def update(self, turn: Array | None = None) -> None:
-        """Make the field of the amplitudes; vectors turned by a matrix (3, 3) if that is given."""
+        """Compute the field from the amplitudes; turn vectors by a matrix (3, 3) if given."""
         n, a = self._function.function_space.dofmap.bs, self.value
         dofs = a @ self._basis if self._basis is not None else a.reshape(-1, n)[self._places].ravel()
         if turn is not None and n > 1:
