@@ -62,6 +62,7 @@ class FrequencyResponse:
 
     Attributes:
         names: of the outputs.
+        loose: whether a motion has no stiffness: the turn of a free hub, or of a hinge that nothing holds.
     """
 
     def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Output]):
@@ -71,6 +72,7 @@ class FrequencyResponse:
         self.force = np.array(force, dtype=np.complex128)
         self.force[analysis.system.held.clamped] = 0.0
         pencil = spinning.pencil
+        self.loose = analysis.free or bool(np.any(spinning.pairs.bounds >= 1.0))
         self._solver = ComplexSolver((pencil.K, pencil.C, pencil.M))
 
     def direct(self, omega: float) -> Array:
@@ -92,7 +94,7 @@ class FrequencyResponse:
             frequencies: rad/s.
             count: modes taken; what all others answer statically is added.
         """
-        first = self.spinning.first(count)
+        first = self.spinning.modal_basis(count)
         pairs, n = first.pairs, np.diag(first.own)
         seen = np.array([self._read(x, s) for x, s in zip(pairs.right.T, pairs.values, strict=True)]).T
         gains = self._summed(pairs.left.conj().T @ self.force) / n
@@ -108,17 +110,18 @@ class FrequencyResponse:
         return np.array([at(omega) + left_out(omega) for omega in frequencies])
 
     def _left_out(self, at: Callable[[float], Array]) -> Callable[[float], Array]:
-        """Return what all other modes answer, as a function of the frequency: what is static, and a free hub's turn.
+        """Return what all other modes answer, as a function of frequency: static, or of a motion without stiffness.
 
         Args:
             at: response of the modes that are taken, of the frequency.
         """
-        if not self.analysis.free:
+        if not self.loose:
             static = self.direct(0.0) - at(0.0)
             return lambda omega: static
-        values = self.spinning.pairs.values
-        vibrating = values[values.imag > 0.0]
-        known = np.array([0.2, 0.4, 0.6]) * float(np.min(np.abs(vibrating if len(vibrating) else values)))
+        sizes = np.abs(self.spinning.pairs.resolved.imag)
+        known = np.array([0.2, 0.4, 0.6]) * float(
+            np.min(sizes[sizes > 0.0], initial=np.max(np.abs(self.spinning.pairs.values)))
+        )
         powers = np.array([[1.0, 1 / (1j * w), 1 / (1j * w) ** 2] for w in known])
         parts = np.linalg.solve(powers, np.array([self.direct(w) - at(w) for w in known]))
         return lambda omega: np.asarray(np.array([1.0, 1 / (1j * omega), 1 / (1j * omega) ** 2]) @ parts)

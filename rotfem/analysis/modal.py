@@ -157,6 +157,16 @@ class Spinning:
         """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs."""
         return self.pencil.gram(self.pairs.left, self.pairs.values, self.pairs.right, self.pairs.values)
 
+    def modal_basis(self, count: int) -> Spinning:
+        """Return it with the pairs that motions are sums of: of its first modes those that are not zero to round-off.
+
+        With the growing one of two real λ and −λ of a conservative pencil comes the other: P(−λ) is P(λ)ᵀ.
+        """
+        pairs = self.pairs.select(np.flatnonzero(self.pairs.bounds[:count] < 1.0))
+        real = pairs.select(np.flatnonzero((pairs.values.imag == 0.0) & self.pencil.conservative))
+        other = Eigenpairs(-real.values, real.left, real.right, real.errors, real.bounds)
+        return replace(self, pairs=pairs.joined(other), described=None)
+
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
         return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array, save_npz
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.modal_damping import KEY
-from rotfem.errors import InputError, SceneError
+from rotfem.errors import ComputationError, InputError, SceneError
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import PlusLowRank, sparse_part
 from rotfem.results.files import writing
@@ -74,10 +74,14 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
 
     Raises:
         SceneError: the analysis is distributed over several processes.
+        ComputationError: a motion has no stiffness.
     """
     serial(analysis, "the state-space model")
     structure = analysis.structure
-    spinning = spinning.first(count)
+    if np.any(spinning.pairs.bounds[:count] >= 1.0):
+        what = "there is no static answer to a force: a mode has the frequency zero to round-off"
+        raise ComputationError(what, advice="a spring at a hinge that nothing holds")
+    spinning = spinning.modal_basis(count)
     pairs, n = spinning.pairs, np.diag(spinning.own)
     tip = structure.tip_values.columns(len(spinning.q))
     blocks, rows, columns = [], [], []

@@ -142,10 +142,10 @@ def frequencies_of(
         return np.unique(lines), np.zeros(len(np.unique(lines)), dtype=bool), []
     swinging = spinning.pairs.resolved.imag
     last = angular(high, "--to", 1.2 * float(np.max(swinging)))  # a fifth beyond the highest mode
-    free = answers.analysis.free
+    free = answers.loose
     first = angular(low, "--from", 0.5 * float(np.min(swinging[swinging > 0.0], initial=last)) if free else 0.0)
     if free and first == 0.0:
-        raise SceneError("command line", "--from", low, "must be above 0 of a free hub, which nothing holds")
+        raise SceneError("command line", "--from", low, "must be above 0 of a free hub or a hinge that nothing holds")
     if not 0.0 <= first < last or number < 2:
         reason = "frequencies must increase from at least 0 (rad/s, or with a unit), and their number be at least 2"
         raise SceneError("command line", "--from, --to, --number", [first, last, number], reason)

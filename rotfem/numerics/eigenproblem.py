@@ -197,6 +197,11 @@ class Eigenpairs:
         vectors = self.right[:, index], self.left[:, index]
         return Eigenpairs(self.values[index], *vectors, self.errors[index], self.bounds[index])
 
+    def joined(self, others: Eigenpairs) -> Eigenpairs:
+        """Return these pairs and others behind them."""
+        names = ("values", "right", "left", "errors", "bounds")
+        return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
+
 
 def basis_of(wanted: int, unknowns: int) -> int:
     """Return how many vectors the basis of SLEPc's solver has for so many eigenvalues of 2n, n the unknowns."""

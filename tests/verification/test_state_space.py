@@ -15,7 +15,7 @@ from scipy import signal
 from scipy.io import mmread
 from scipy.sparse import load_npz
 
-from rotfem import OutputError, modes, run
+from rotfem import ComputationError, OutputError, modes, run
 from rotfem.analysis.state_space import state_space, write_matrices
 
 pytestmark = pytest.mark.usefixtures("unestimated")
@@ -105,10 +105,24 @@ def test_frequency_response_converges_with_the_modes(unit_beam: Any) -> None:
 
 
 def test_unstable_mode_is_in_the_model(hub_beam: Any) -> None:
-    """A real growing eigenvalue is one state, and its pole is the growth rate."""
+    """A real growing eigenvalue is one state, its decaying partner another; so the model answers as the matrices do."""
     result = modes(hub_beam({"model.theory": "linear", "motion": {"type": "constant", "speed": 4.0}}))
-    model = state_space(result.analysis, result.spinning, 2)
-    assert np.max(np.linalg.eigvals(model.A).real) == pytest.approx(2.743576669, rel=1e-6)  # iccia_frequencies.csv
+    model = state_space(result.analysis, result.spinning, 6)
+    poles = np.linalg.eigvals(model.A).real
+    assert np.max(poles) == pytest.approx(2.743576669, rel=1e-6)  # iccia_frequencies.csv
+    assert np.min(poles) == pytest.approx(-np.max(poles))
+    tip, s, p = result.analysis.structure.tip_values.columns(len(result.spinning.q)), 2j, result.spinning.pencil
+    M, C, K = (p.apply(A, np.eye(len(tip))) for A in (p.M, p.C, p.K))
+    full = tip.T @ np.linalg.solve(s**2 * M + s * C + K, tip)
+    found = model.C @ np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B) + model.D
+    np.testing.assert_allclose(found, full, atol=1e-4 * np.max(np.abs(full)))
+
+
+def test_what_nothing_holds_has_no_static_answer(spin_up: Any) -> None:
+    """A hinge on the axis, without a spring: the flexibility of the others would be lost in round-off."""
+    result = modes(spin_up({"structure.root": {"lag_stiffness": 0.0}, "motion": {"type": "constant", "speed": 0.0}}))
+    with pytest.raises(ComputationError, match="no static answer"):
+        state_space(result.analysis, result.spinning, 2)
 
 
 def test_exported_matrices(unit_beam: Any, tmp_path: Path) -> None:
