@@ -356,8 +356,9 @@ class Described:
     def _energies(self) -> Array:
         """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
         names, X, MX = self._structure.unknowns, self._right, self._analysis.mass_times(self._spinning)
-        owned = self._structure.V.dofmap.index_map.size_local * len(names)
-        x, mx = (self._structure.oriented(Y[:owned].reshape(-1, len(names), X.shape[1])) for Y in (X, MX))
+        shape = (self._structure.V.dofmap.index_map.size_local, len(names), X.shape[1])
+        owned = shape[0] * shape[1]
+        x, mx = (self._structure.oriented(Y[:owned].reshape(shape)) for Y in (X, MX))
         hub = np.real(np.sum(X[owned:].conj() * MX[owned:], axis=0))  # on the last rank
         energies = summed(self._analysis.comm, np.vstack([np.real(np.sum(x.conj() * mx, axis=0)), hub]))
         return np.asarray(energies / energies.sum(axis=0))

@@ -34,9 +34,9 @@ def mode_tables(
     """
     errors = FrequencyErrors(analysis) if analysis.estimates else None
     near = None if errors is None else errors.near(speed, count)
-    spinning = analysis.at(speed, count, keep=keep, near=near)
-    rigid = int(spinning.rigid)
-    spinning = spinning.first(count - rigid)
+    found = analysis.at(speed, count, keep=keep, near=near)
+    rigid = int(found.rigid)
+    spinning = found.first(count - rigid)
     rows = mode_rows(analysis, spinning, None if errors is None else errors(spinning))
     synchronous = critical(rows, speed, analysis.fixed is not None)
     warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous, *doubtful(rows)]
@@ -45,7 +45,8 @@ def mode_tables(
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
     if rigid:  # hub and structure turn together, λ = 0
-        first: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
+        columns = rows[0] if rows else mode_rows(analysis, found.first(1), None if errors is None else [0.0])[0]
+        first: dict[str, Any] = dict.fromkeys(columns, 0.0)
         named = dict.fromkeys(("label", "name"), "rigid body")
         rows = [{**first, "mode": 1, **named, "stability": "neutral", "share_hub": 1.0}, *rows]
     structure = analysis.structure

@@ -200,25 +200,26 @@ def response_figure(result: ResponseResult) -> Figure:
         return figure
     panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
     x = units.frequencies(result.frequencies)
+    mark = "." if len(x) == 1 else ""
     for (left, right), names in zip(panels, rows.values(), strict=True):
         dress(left, y=f"amplitude {shown_unit(names[0])}")
         dress(right, y="phase (°)")
         for c, name in enumerate(names):
             direct, modal = result.direct[:, own[name]], np.abs(result.modal[:, own[name]])
-            left.semilogy(x, np.abs(direct), lw=1.3, color=f"C{c}")
+            left.semilogy(x, np.abs(direct), marker=mark, lw=1.3, color=f"C{c}")
             left.semilogy(x, modal, lw=0.9, ls="--", color="0.3")
             phase = np.degrees(np.angle(direct))
             jumps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
             broken = np.insert(x, jumps, np.nan), np.insert(phase, jumps, np.nan)
             what = described(name)[0]  # in few words: "tip u₁", "root f₁", "angle ψ"
             what = f"{name.partition('_')[0]} {what.split()[-1]}" if "_" in name else what
-            right.plot(*broken, lw=1.2, color=f"C{c}", label=what)
+            right.plot(*broken, marker=mark, lw=1.2, color=f"C{c}", label=what)
         sizes = np.abs(result.direct[:, [own[name] for name in names]])
         seen = max(0.3 * float(np.min(np.quantile(sizes, 0.05, axis=0))), ZERO * float(np.max(sizes)))
         left.set_ylim(seen, 3.0 * float(np.max(sizes)))
         right.set(ylim=(-190, 190), yticks=np.arange(-180, 181, 90))
         right.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
-    panels[0, 0].set_xlim(x[0], x[-1])
+    panels[0, 0].set_xlim(*(x[[0, -1]] if len(x) > 1 else 0.5 * x[0] * np.array([1, 3])))
     for panel in panels[-1]:
         panel.set_xlabel(f"frequency of the load ({units.frequency})")
     return figure

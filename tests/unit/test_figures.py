@@ -5,6 +5,7 @@ Judged on the figure as Matplotlib lays it out, of results made by hand.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -235,6 +236,17 @@ def test_a_response() -> None:
     sizes = np.abs(direct[:, [1, 2]])
     assert high > sizes.max()
     assert np.all(np.mean(sizes < low, axis=0) < 0.05)
+
+
+def test_a_response_at_one_frequency() -> None:
+    """Points, in the middle of the axis."""
+    direct = np.array([[1.0 + 0.5j]])
+    result = ResponseResult(said(outputs=["tip_u2"], speed=6.0), [{"frequency": 3.0}], direct, direct)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = result.plot()
+    check(figure)
+    assert [line.get_marker() for axes in figure.axes for line in axes.get_lines()] == [".", "None", "."]
 
 
 # --- plates -----------------------------------------------------------------------------------------------------------

@@ -469,6 +469,9 @@ def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
     assert [row["label"] for row in result.rows] == ["rigid body", "lag 1", "lag 2"]
     assert list(result.shapes) == ["mode 2: lag 1", "mode 3: lag 2"]
     assert result.draw(tmp_path)[0].is_file()
+    alone = modes(unit_beam(motion=torque, modes={"count": 1}))
+    assert list(alone.rows[0]) == list(result.rows[0])
+    assert alone.frequencies.tolist() == [0.0]
     with pytest.raises(SceneError, match="free hub"):
         modes(unit_beam(motion=torque), sensitivities=True)
     for refused in (
