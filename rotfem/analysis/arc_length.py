@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 
 from rotfem.analysis.load_steps import LoadFactors, balance, check_inside_out, recounted
 from rotfem.errors import ComputationError
-from rotfem.numerics.linear import DirectSolver, surely_negative
+from rotfem.numerics.linear import DirectSolver, negative_count
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
@@ -184,7 +184,7 @@ class Tracer:
         if before is not None and self._product(t_q, before.t_q) + t_s * before.t_s < 0.0:
             t_q, t_s = -t_q, -t_s
         K = self.system.matrix(1.0, 0.0, 0.0, 1.0)
-        return Point(q, s, t_q, t_s, surely_negative(K))
+        return Point(q, s, t_q, t_s, negative_count(K, sure=True))
 
     def _product(self, a: Array, b: Array) -> float:
         """Return the mean of the products of two arrays in the scales of the unknowns, over all ranks."""

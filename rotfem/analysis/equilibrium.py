@@ -29,7 +29,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.linear import DirectSolver, surely_negative
+from rotfem.numerics.linear import DirectSolver, negative_count
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
@@ -119,7 +119,7 @@ def _grown(system: Any, growth: LoadFactors, newton: Newton, past_limits: bool, 
             failure = error
         else:
             # the tangent of Newton's last iteration is at hand, and as good as that of the equilibrium
-            if found.sure and not surely_negative(system.A):
+            if found.sure and not negative_count(system.A, sure=True):
                 return found.q
             system.count_rotations_from(found.reference)
             total = system.structure.total(found.q)

@@ -14,10 +14,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from petsc4py import PETSc
 
 from rotfem.errors import InputError
 from rotfem.numerics.projection import sparse_part
+
+Array = npt.NDArray[np.float64]
 
 KEY = "structure.supports"
 
@@ -54,37 +57,28 @@ class FixedFrame:
     def __init__(self, system: Any):
         self.V, self.supports = system.V, system.model.problem.structure.supports
         names, axis = list(system.structure.unknowns), np.asarray(system.motion.axis, dtype=float)
-        self._places = {name: i for i, name in enumerate(names)}
-        self._block, self._map = len(names), self.V.dofmap.index_map
-        entries = []
-        for kind in ("u", "theta"):
-            second, third = (self._places[f"{kind}{i}"] for i in (2, 3))
-            entries += [(second, third, -axis[0]), (third, second, axis[0])]
-        first, last = self._map.local_range
-        self._J = self._matrix(system, [(node, *entry) for node in range(first, last) for entry in entries])
         if system.hub is not None:
             raise InputError(KEY, None, "that differ by direction need a shaft whose speed is given")
-        self._added = [self._of_supports(system, i) for i in range(2)]
-
-    def _matrix(self, system: Any, entries: list[tuple[int, int, int, float]]) -> Any:
-        """Return the matrix of entries (node, row, column, value), rows and columns counted within a node."""
-        owned = self._map.size_local * self._block
-        A = PETSc.Mat().createAIJ(((owned, None), (owned, None)), comm=system.comm)
-        A.setUp()
-        for node, i, j, value in entries:
-            A.setValue(node * self._block + i, node * self._block + j, value, addv=PETSc.InsertMode.ADD_VALUES)
-        A.assemble()
-        return A
-
-    def _of_supports(self, system: Any, which: int) -> Any:
-        """Return K_s (0) or C_s (1)."""
-        x, size = self.V.tabulate_dof_coordinates()[: self._map.size_local, 0], system.structure.length
-        places, entries = (self._places["u2"], self._places["u3"]), []
+        turn = np.zeros((len(names), len(names)))
+        for kind in ("u", "theta"):
+            i, j = (names.index(f"{kind}{k}") for k in (2, 3))
+            turn[i, j], turn[j, i] = -axis[0], axis[0]
+        x = self.V.tabulate_dof_coordinates()[: self.V.dofmap.index_map.size_local, 0]
+        self._J = self._matrix(np.broadcast_to(turn, (len(x), *turn.shape)))
+        added, across = np.zeros((2, len(x), *turn.shape)), np.ix_(*2 * [[names.index("u2"), names.index("u3")]])
         for support in self.supports:
-            for node in np.flatnonzero(np.abs(x - support.x) <= ROUND_OFF * size) + self._map.local_range[0]:
-                values = np.asarray(support.anisotropic[which])
-                entries += [(int(node), places[i], places[j], values[i, j]) for i in (0, 1) for j in (0, 1)]
-        return self._matrix(system, entries)
+            for node in np.flatnonzero(np.abs(x - support.x) <= ROUND_OFF * system.structure.length):
+                for blocks, values in zip(added, support.anisotropic, strict=True):
+                    blocks[node][across] += values
+        self._added = [self._matrix(blocks) for blocks in added]  # K_s and C_s
+
+    def _matrix(self, blocks: Array) -> Any:
+        """Return the matrix with a block (n, n) for each owned node on its diagonal."""
+        first, last = self.V.dofmap.index_map.local_range
+        rows = np.arange(last - first + 1, dtype=PETSc.IntType)
+        size = (len(blocks) * blocks.shape[1], None)
+        csr = rows, first + rows[:-1], np.array(blocks)
+        return PETSc.Mat().createBAIJ((size, size), blocks.shape[1], csr=csr, comm=self.V.mesh.comm).convert("aij")
 
     def __call__(self, matrices: tuple[Any, Any, Any], speed: float) -> tuple[Any, Any, Any]:
         """Return M, C and K in the fixed frame of those in the rotating one, at a speed (rad/s).

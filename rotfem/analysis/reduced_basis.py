@@ -14,14 +14,13 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from numpy.linalg import norm
-from petsc4py import PETSc
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
-from rotfem.numerics.projection import orthonormal, summed, times, with_ghosts
+from rotfem.numerics.projection import dense, orthonormal, summed, times, with_ghosts
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -87,7 +86,7 @@ class SmallPencil(Pencil):
         values, x, y = found or quadratic(self.M, self.C, self.K, target)
         first = np.arange(min(2 * count + 2, len(values)))
         if self.damped and heavily_damped(values[first][self.stiff(x[:, first])]):
-            whole = (PETSc.Mat().createAIJ(A.shape, csr=_csr(A), comm=MPI.COMM_SELF) for A in (self.M, self.C, self.K))
+            whole = (dense(MPI.COMM_SELF, A).convert("aij") for A in (self.M, self.C, self.K))
             return Pencil(*whole).solve(count, target)
         telling = (values.real >= 0.0) | (not self.conservative)
         upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
@@ -265,8 +264,3 @@ class ReducedAnalysis(ModalAnalysis):
         residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real
         lengths = np.sum(right.conj() * product(self._metric, right), axis=0).real
         return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
-
-
-def _csr(m: Array) -> tuple[Array, Array, Array]:
-    n = len(m)
-    return np.arange(n + 1, dtype=np.int32) * n, np.tile(np.arange(n, dtype=np.int32), n), m.ravel()

@@ -30,7 +30,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
-from rotfem.numerics.linear import negative_eigenvalues, righted, surely_negative, symmetric, use_direct_solver
+from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed, times
 
@@ -106,7 +106,7 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
     held.set_time(0.0, held.motion.at_speed(speed))
     held.set_state(q[: len(held.q.x.array)])
     K = held.matrix(1.0, 0.0, 0.0, 1.0)
-    if _negative(K) == 0:
+    if negative_count(K) == 0:
         return Stability()
     matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
     clamped = Pencil(*matrices)
@@ -121,23 +121,13 @@ def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
         clamped: without it.
     """
     negative = None if clamped.factor is None else clamped.factor.negative
-    negative = _negative(clamped.K) if negative is None else negative
+    negative = negative_count(clamped.K) if negative is None else negative
     if negative == 0:
         return Stability()
     if pencil is clamped:
         return by_motions(pencil, negative)
     # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
     return by_motions(pencil, None, clamped.scale())
-
-
-def _negative(K: Any) -> int | None:
-    """Return how many eigenvalues of K are negative; None where K is not symmetric, or singular."""
-    if not symmetric(K):
-        return None
-    try:
-        return negative_eigenvalues(K)
-    except ComputationError:
-        return None
 
 
 def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
@@ -150,7 +140,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
     """
     count = 8 if negative is None else max(8, 2 * negative + 2)
     held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can
-    if negative and surely_negative(pencil.K) == 0:
+    if negative and negative_count(pencil.K, sure=True) == 0:
         return Stability(negative, complete=False, lost=True)
     growth = frequency = 0.0
     while True:
@@ -271,7 +261,7 @@ def critical_speed(system: Any) -> float | None:
     K_1.diagonalScale(d, d)
     K_2.diagonalScale(d, d)
     K_2.scale(-1.0)
-    if _negative(righted(K_1, -1.0)) != 0:  # of a hinge without a spring round-off makes a stiffness, of any sign
+    if negative_count(righted(K_1, -1.0)) != 0:  # of a hinge without a spring round-off makes a stiffness, of any sign
         K_1 = righted(K_1)
     # nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
     nu = _largest(K_2, K_1, SOON)

@@ -29,7 +29,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
-from rotfem.numerics.projection import times
+from rotfem.numerics.projection import times, times_transposed
 from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
@@ -71,13 +71,18 @@ class ClampWork:
         """Return the derivatives of these forces to q, v and a about an equilibrium, (unknowns, motions) each."""
         system = self._system
         wholes = {kind: system.whole(kind) for kind in "KCM"}
-        K, C, M = (rows_times(wholes[kind], self._held) for kind in "KCM")
+        K, C, M = (self._rows_times(wholes[kind], self._held) for kind in "KCM")
         if self._springs:
             du, terms = ufl.TrialFunction(system.V), added(self._terms)
             for part, x in ((K, system.q), (C, system.v)):
                 slope = forms.form(ufl.derivative(terms, x, du), once=True)
-                part -= rows_times(system.whole_of([slope]), self._turns)
+                part -= self._rows_times(system.whole_of([slope]), self._turns)
         return K, C - self._damping_tangent(wholes["M"]), M
+
+    @staticmethod
+    def _rows_times(A: Any, columns: Array) -> Array:
+        """Return Aᵀ times columns; zero of None."""
+        return np.zeros_like(columns) if A is None else times_transposed(A, columns)
 
     # --- forces between the hub and all of the structure ----------------------------------------------------------
 
@@ -120,20 +125,6 @@ class ClampWork:
         return np.asarray(force @ system.root.carried(q))
 
 
-def rows_times(A: Any, columns: Array) -> Array:
-    """Return Aᵀ times owned columns (n, m) of a PETSc matrix, owned rows; zero of None, as of a square one."""
-    if A is None:
-        return np.zeros_like(columns)
-    y, x = A.createVecs()
-    out: Array = np.zeros((y.getLocalSize(), columns.shape[1]))
-    for product, column in zip(out.T, columns.T, strict=True):
-        x.array[:] = column
-        A.multTranspose(x, y)
-        moved = np.flatnonzero(y.array)  # few at a clamp; what is not written takes up no memory
-        product[moved] = y.array[moved]
-    return out
-
-
 # --- of a linear theory ----------------------------------------------------------------------------------------------
 
 
@@ -170,7 +161,7 @@ class AtClamp:
             sign, (rows, motions) = -1.0, self._turns
         elif EFFECT in of and self._others is not None:  # the hub takes up what strains do not (see `hub_damping`)
             sign, (rows, motions) = -1.0, self._others
-        return rows_times(A.createSubMatrix(rows), sign * motions)
+        return times_transposed(A.createSubMatrix(rows), sign * motions)
 
 
 class ClampRows:

@@ -249,12 +249,13 @@ def righted(K: Any, sign: float = 1.0) -> Any:
     return out
 
 
-def surely_negative(K: Any) -> int | None:
-    """Return how many eigenvalues of a stiffness are surely negative; None where none are counted."""
-    if not symmetric(K):
-        return None
+def negative_count(K: Any, sure: bool = False) -> int | None:
+    """Return how many eigenvalues of a stiffness are negative, only those that surely are if so wanted.
+
+    None are counted, and None is returned, where it is singular or not symmetric.
+    """
     try:
-        return negative_eigenvalues(righted(K))
+        return negative_eigenvalues(righted(K) if sure else K) if symmetric(K) else None
     except ComputationError:
         return None
 

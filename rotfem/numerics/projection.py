@@ -58,6 +58,18 @@ def times(A: Any, X: Array) -> Array:
     return out
 
 
+def times_transposed(A: Any, X: Array) -> Array:
+    """Return Aᵀ X of a matrix and columns (n, m)."""
+    y, x = A.createVecs()
+    out: Array = np.zeros((y.getLocalSize(), X.shape[1]))
+    for product, column in zip(out.T, X.T, strict=True):
+        x.array[:] = column
+        A.multTranspose(x, y)
+        moved = np.flatnonzero(y.array)  # what is not written takes up no memory
+        product[moved] = y.array[moved]
+    return out
+
+
 def dense(comm: Any, X: Array) -> Any:
     """Return columns of owned rows (n, m) as a dense PETSc matrix; those in Fortran order are not copied."""
     columns = np.asarray(X, dtype=PETSc.ScalarType, order="F")

@@ -27,7 +27,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import ROUNDED, DirectSolver
-from rotfem.numerics.projection import combined, new_directions, sparse_part, summed, times
+from rotfem.numerics.projection import combined, new_directions, sparse_part, summed, times, times_transposed
 
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any]
@@ -222,8 +222,7 @@ class RitzPairs:
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
         self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
         self._solver = self._solver_at(target)
-        self._x, self._b = matrices[2].createVecs()
-        self.V = np.zeros((self._x.getLocalSize(), 0))
+        self.V = np.zeros((matrices[2].getLocalSize()[0], 0))
         self._products = [self.V] * 3
         self.add(start)
 
@@ -275,13 +274,10 @@ class RitzPairs:
 
     def _transposed(self, Y: Array) -> Array:
         """Return (λ² M + λ C + K)^H y for all pairs."""
-        total = np.zeros(Y.shape, dtype=np.complex128)  # all of Y is real where all values are
+        both, m, total = np.hstack([Y.real, Y.imag]), Y.shape[1], np.zeros(Y.shape, dtype=np.complex128)
         for A, power in zip(self.matrices, (2, 1, 0), strict=True):
-            for part, factor in ((Y.real, 1.0), (Y.imag, 1j)):
-                for j in range(Y.shape[1]):
-                    self._x.array[:] = part[:, j]
-                    A.multTranspose(self._x, self._b)
-                    total[:, j] += factor * np.conj(self.values[j]) ** power * self._b.array
+            parts = times_transposed(A, both)
+            total += self.values.conj() ** power * (parts[:, :m] + 1j * parts[:, m:])
         return total
 
     def grow(self, own: bool) -> int:
