@@ -32,7 +32,7 @@ CAPABILITIES = {
     """,
     "reduced models": "analysis.reduced commands.reduced_history",
     "time integration": """
-        analysis.time analysis.march analysis.alpha_family analysis.dense_output
+        analysis.time analysis.march analysis.schemes analysis.dense_output
         analysis.dense_output analysis.energy_conserving analysis.first_motion
         analysis.march analysis.stepper analysis.time_grid
         analysis.runge_kutta analysis.schemes

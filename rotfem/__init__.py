@@ -18,9 +18,9 @@ from rotfem.registry import register
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
-    from rotfem.analysis.alpha_family import GeneralisedAlpha as GeneralisedAlpha
-    from rotfem.analysis.alpha_family import Newmark as Newmark
     from rotfem.analysis.runge_kutta import ESDIRK4 as ESDIRK4
+    from rotfem.analysis.schemes import GeneralisedAlpha as GeneralisedAlpha
+    from rotfem.analysis.schemes import Newmark as Newmark
     from rotfem.analysis.schemes import Scheme as Scheme
     from rotfem.analysis.schemes import Stage as Stage
     from rotfem.analysis.schemes import State as State

@@ -24,8 +24,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rotfem.analysis.alpha_family import GeneralisedAlpha
-from rotfem.analysis.schemes import Array, Equations, Scheme, Stage, State, divided_difference, inner
+from rotfem.analysis.schemes import Array, Equations, GeneralisedAlpha, Scheme, Stage, State, divided_difference, inner
 from rotfem.errors import ComputationError
 from rotfem.registry import register
 

@@ -19,10 +19,9 @@ from rotfem.errors import InputError
 from rotfem.mechanics import work
 from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
-from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.work import Mechanics, RigidTurn, Variation
+from rotfem.mechanics.work import Frame, Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
 from rotfem.registry import resolved

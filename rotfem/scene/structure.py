@@ -66,7 +66,7 @@ def _table_of(table: Any, given: dict[str, Any], name: str, file: str) -> dict[s
 
 
 for _name, _home in (
-    ("planar_beam", "planar_beam:PlanarBeam"),
+    ("planar_beam", "beam:PlanarBeam"),
     ("spatial_beam", "spatial_beam:SpatialBeam"),
     ("plate", "plate:Plate"),
 ):

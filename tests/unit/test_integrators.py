@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotfem.analysis.alpha_family import AlphaFamily, GeneralisedAlpha, Newmark
-from rotfem.analysis.schemes import State
+from rotfem.analysis.schemes import AlphaFamily, GeneralisedAlpha, Newmark, State
 from rotfem.commands.problem import scheme_of
 from rotfem.scene import Scene, Time
 

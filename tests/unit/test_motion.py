@@ -13,8 +13,8 @@ from mpi4py import MPI
 from scipy.integrate import quad
 
 from rotfem.commands.problem import motion_of
-from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.motion import Motion, smooth_spin_up
+from rotfem.mechanics.work import Frame
 from rotfem.scene import Scene
 
 BEAM: dict[str, Any] = {

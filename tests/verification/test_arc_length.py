@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar, root
 from scipy.special import ellipe, ellipk
 
 import rotfem
-from rotfem.analysis.arc_length import LoadPath, Tracer
+from rotfem.analysis.equilibrium import LoadPath, Tracer
 from rotfem.analysis.load_steps import LoadFactors
 from rotfem.numerics.newton import Newton
 

@@ -15,9 +15,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from rotfem import Scene, run
-from rotfem.analysis.alpha_family import Newmark
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.schemes import State
+from rotfem.analysis.schemes import Newmark, State
 from rotfem.analysis.stepper import Stepper
 from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
