@@ -106,14 +106,14 @@ class FrequencyResponse:
             mirrored = seen.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
             return np.asarray(plain + mirrored)
 
-        left_out = self._left_out(at)
-        return np.array([at(omega) + left_out(omega) for omega in frequencies])
+        rest = self._correction(at)
+        return np.array([at(omega) + rest(omega) for omega in frequencies])
 
-    def _left_out(self, at: Callable[[float], Array]) -> Callable[[float], Array]:
-        """Return what all other modes answer, as a function of frequency: static, or of a motion without stiffness.
+    def _correction(self, at: Callable[[float], Array]) -> Callable[[float], Array]:
+        """Return the response of all other modes over frequency: static, or of a motion without stiffness.
 
         Args:
-            at: response of the modes that are taken, of the frequency.
+            at: response of the computed modes, a function of the frequency.
         """
         if not self.loose:
             static = self.direct(0.0) - at(0.0)

@@ -91,7 +91,7 @@ class Resultants:
         higher = self.model.strains(theory.prestress_measures(s.type)) if theory.prestress else m.strains
         out: Any = 0
         for first, strain in zip(m.strains, higher, strict=True):
-            if strain.name in {*s.stiff, *s.prestressing}:
+            if strain.name in {*s.stiff, *s.prestress_strains}:
                 shape = ufl.as_ufl(strain.value).ufl_shape
                 force = first.force(ufl.as_vector([1.0] * shape[0]) if shape else ufl.as_ufl(1.0))
                 out += ufl.inner(force, ufl.derivative(m.k.variation(strain.value), self.system.q, du)) * strain.measure
@@ -135,7 +135,7 @@ class Resultants:
         K, factors = (_bordered(corner, rows, blocks) for corner in (rest, _empty(M)))
         pencil = Pencil(_bordered(M, apart, zero), _bordered(C, apart, zero), K)
         scale(pencil, rest, factors, unit)
-        has_stress = system.prestressed if system.linear else bool(np.any(self._state.x.array))
+        has_stress = system.has_prestress if system.linear else bool(np.any(self._state.x.array))
         if self._stressed is None or not system.comm.allreduce(has_stress, op=MPI.LOR):
             return pencil, None
         stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
@@ -200,15 +200,15 @@ class KeptDigits:
             return np.asarray(summed(pencil.comm, np.sum(left.conj() * X, axis=0)))
 
         eta = self.system.model.mechanics.damping.stiffness
-        left_out: Array = np.zeros(len(bounds))
+        round_off: Array = np.zeros(len(bounds))
         if stressed is not None:
-            left_out += ROUNDED * np.abs(products(pencil.apply(stressed, right)))
+            round_off += ROUNDED * np.abs(products(pencil.apply(stressed, right)))
         if eta is not None:  # C = η K + … is summed as K was
-            left_out += np.abs(float(eta.value) * found.values) * RoundOff(pencil).stiffness(left, right)
-        if np.any(left_out):
+            round_off += np.abs(float(eta.value) * found.values) * RoundOff(pencil).stiffness(left, right)
+        if np.any(round_off):
             MX, CX = (pencil.apply(A, right) for A in (pencil.M, pencil.C))
             slope = np.abs(products(2 * found.values * MX + CX) * found.values)
-            bounds = bounds + relative(left_out / np.maximum(slope, np.finfo(float).tiny))
+            bounds = bounds + relative(round_off / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
         pencil.spectrum_error, self.used = kept.spectrum_error, True

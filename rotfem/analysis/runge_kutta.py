@@ -112,7 +112,7 @@ ROWS, (_REAL, _ABOVE) = np.linalg.inv(_VECTORS)[_FIRST], _VECTORS[:, _FIRST].T
 BACK = np.stack([_REAL.real, 2 * _ABOVE.real, -2 * _ABOVE.imag], axis=1)
 
 #: Iterations before a solution is given up.
-MOST = 10
+MOST_ITERATIONS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +226,7 @@ def iterate(stages: Together, h: float, equations: Equations, linearised: Any, l
     linearised.take((REAL / h, ABOVE / h))
     newton, previous, size = equations.newton, np.inf, np.inf
     enough = 0.01 * newton.tolerance  # what it leaves adds up over the steps
-    for k in range(1, MOST + 1):
+    for k in range(1, MOST_ITERATIONS + 1):
         residuals = np.array([equations.imbalance(s) for s in stages])
         real, above = linearised.solve(ROWS[0].real @ residuals, ROWS[1] @ residuals)
         dq = BACK.dot(np.array((real, above.real, above.imag)))
@@ -237,7 +237,7 @@ def iterate(stages: Together, h: float, equations: Equations, linearised: Any, l
         if k > 1 and (size <= enough or (rate < 1.0 and rate / (1 - rate) * size <= enough)):
             linearised.serves = k < 5  # else the next step gets new matrices
             return None
-        if not np.isfinite(size) or (k > 2 and (rate >= 1.0 or size * rate ** (MOST - k) > enough)):
+        if not np.isfinite(size) or (k > 2 and (rate >= 1.0 or size * rate ** (MOST_ITERATIONS - k) > enough)):
             break
         previous = size
     if last and size <= newton.tolerance:

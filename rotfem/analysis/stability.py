@@ -1,9 +1,9 @@
 """Whether an equilibrium in the rotating frame is stable: by its energy, and where that does not decide, by motions.
 
-K = ∂F/∂q at an equilibrium of a conservative structure is the second derivative of the amended potential W + V − T0.
-If it is positive, the equilibrium is stable (Lagrange and Dirichlet), with damping or without. If n of its eigenvalues
-are negative, then by the theorems of Kelvin, Tait and Chetaev an odd n means instability, any n does with complete
-damping, and an even n may be held by gyroscopic forces. That is decided by the eigenvalues λ of λ² M + λ C + K, and
+K = ∂F/∂q at an equilibrium of a conservative structure is the second derivative of the amended potential W + V − T0. If
+it is positive, the equilibrium is stable (Lagrange and Dirichlet), with damping or without. If n of its eigenvalues are
+negative, then by the theorems of Kelvin, Tait and Chetaev an odd n means instability, any n does with complete damping,
+and an even n may be stabilised by gyroscopic forces. That is decided by the eigenvalues λ of λ² M + λ C + K, and
 whether all that matter have been found is counted: without damping
 
     n = k_r + 2 k_c + 2 k_i
@@ -139,7 +139,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
         target: shift, away from the zero eigenvalue of a free hub (1/s).
     """
     count = 8 if negative is None else max(8, 2 * negative + 2)
-    held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can
+    gyroscopic = negative is not None and not symmetric(pencil.C)  # forces that may stabilise it
     if negative and negative_count(pencil.K, sure=True) == 0:
         return Stability(negative, complete=False, lost=True)
     growth = frequency = 0.0
@@ -160,30 +160,30 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
         if negative is None:
             return Stability(None, growth, frequency, lost=lost)
-        growing, swinging = _counted(pencil, pairs, held)
+        growing, swinging = _counted(pencil, pairs, gyroscopic)
         if swinging >= negative:  # they leave none to what grows
             return Stability(negative)
         if growing + swinging >= negative:
             return Stability(negative, growth, frequency, lost=lost)
         if count >= 64 or count >= pencil.K.getSize()[0]:
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
-            return Stability(negative, growth, frequency, complete=False, lost=lost or not held)
+            return Stability(negative, growth, frequency, complete=False, lost=lost or not gyroscopic)
         count *= 2
 
 
-def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> tuple[int, int]:
+def _counted(pencil: Pencil, pairs: Eigenpairs, gyroscopic: bool) -> tuple[int, int]:
     """Return (k_r + 2 k_c, 2 k_i): for how many negative eigenvalues of K eigenpairs have been found that come of them.
 
     Args:
         pencil: M, C, K.
         pairs: what was found.
-        held: whether gyroscopic forces can hold what has no minimum of energy.
+        gyroscopic: whether there are gyroscopic forces, which may stabilise it.
     """
     values = pairs.values
     real = values.imag <= SAME * np.abs(values)
     grows = values.real > GROWTH * np.abs(values)
     growing = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
-    if not (held and pencil.conservative):
+    if not (gyroscopic and pencil.conservative):
         return growing, 0
     swings = ~real & (np.abs(values.real) <= GROWTH * np.abs(values))
     return growing, 2 * int(np.sum(_energies(pencil, pairs)[swings] < 0.0))

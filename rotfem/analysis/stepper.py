@@ -370,16 +370,16 @@ class Stepper:
 
         That is so of small systems, after long solutions, and where a balance of energy is kept.
         """
-        s, held = self.system, self._factored == stage.shifts
+        s, reusable = self.system, self._factored == stage.shifts
         if not s.keeps_factor:
             return None
         if s.linear:
             s.set_time(stage.t)
             if s.settled and not s.current:  # the matrix stays as it is from now on, and the factor is that of another
                 return None
-        if not held and (s.linear or stage.over is not None or self._far or self._reliable < RELIABLE):
+        if not reusable and (s.linear or stage.over is not None or self._far or self._reliable < RELIABLE):
             return None
-        return OldFactor(held)
+        return OldFactor(reusable)
 
     def _iterate(self, stage: Stage, state: State, factor: OldFactor | None = None) -> int:
         """Solve a stage by Newton's method, with an old factor if one is given; return the number of iterations.

@@ -27,11 +27,11 @@ Writer = Callable[[Path], list[Path]]
 
 
 #: Most snapshots of a history that are kept.
-MOST = 200
+MOST_STATES = 200
 
 
 class Snapshots:
-    """States of a history at ever wider intervals, so that there are never more than MOST."""
+    """States of a history at ever wider intervals, so that there are never more than MOST_STATES."""
 
     def __init__(self) -> None:
         self.kept: list[tuple[float, Array]] = []
@@ -41,7 +41,7 @@ class Snapshots:
         """Keep a copy of the local dof array q at time t (s), or pass it by."""
         if self._count % self._every == 0:
             self.kept.append((t, q.copy()))
-            if len(self.kept) > MOST:
+            if len(self.kept) > MOST_STATES:
                 self.kept, self._every = self.kept[::2], 2 * self._every
         self._count += 1
 
@@ -83,7 +83,7 @@ def moved(structure: Any, values: Array) -> Array:
 
 def stations_writer(system: Any, stations: StationHistory) -> Callable[[Path], list[Path]]:
     """Return what writes stations.xdmf: displacements, section forces and strains on the line through the stations."""
-    structure, every = system.structure, 1 + (len(stations.t) - 1) // MOST
+    structure, every = system.structure, 1 + (len(stations.t) - 1) // MOST_STATES
     points = structure.places({"x": stations.x})
     others = [name for name in stations.values if name not in structure.components]
 

@@ -251,7 +251,7 @@ class AffineSystem(System):
         return out[0], out[1]
 
     @property
-    def prestressed(self) -> bool:
+    def has_prestress(self) -> bool:
         """Whether there is geometric stiffness at the time set."""
         weights = self._coefficients if self._coefficients is not None else np.zeros(len(self.pieces))
         return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))

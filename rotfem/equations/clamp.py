@@ -44,16 +44,16 @@ class ClampWork:
         fixed = np.zeros((len(weights), 1), dtype=bool)
         fixed[system.clamped] = True
         self._motions: Array = weights[system.clamped]
-        self._held, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
+        self._fixed, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
 
     def __call__(self, residual: Array) -> Array:
         """Return this process's part of their work at the state set, (motions,), of F with its clamped rows."""
         system = self._system
-        held = np.asarray(residual[system.clamped] @ self._motions) - self._damping()
+        reaction = np.asarray(residual[system.clamped] @ self._motions) - self._damping()
         if not self._springs:
-            return held
+            return reaction
         forces = system.sum_of(self._springs)[: len(self._turns)]
-        return np.asarray(held - forces @ self._turns)  # against the turns of hinges the root is held
+        return np.asarray(reaction - forces @ self._turns)  # springs act against the turns of hinges
 
     @cached_property
     def _springs(self) -> list[Any]:
@@ -71,7 +71,7 @@ class ClampWork:
         """Return the derivatives of these forces to q, v and a about an equilibrium, (unknowns, motions) each."""
         system = self._system
         wholes = {kind: system.whole(kind) for kind in "KCM"}
-        K, C, M = (self._rows_times(wholes[kind], self._held) for kind in "KCM")
+        K, C, M = (self._rows_times(wholes[kind], self._fixed) for kind in "KCM")
         if self._springs:
             du, terms = ufl.TrialFunction(system.V), added(self._terms)
             for part, x in ((K, system.q), (C, system.v)):
@@ -226,8 +226,8 @@ class TurningClamp:
         q = np.array([R * (c - 1), R * s, psi])
         v = w * np.array([-R * s, R * c, 1.0])
         a = dw * np.array([-R * s, R * c, 1.0]) - w * w * np.array([R * c, R * s, 0.0])
-        held, repeat = self._clamped_components, len(self.dofs) // len(self._clamped_components)
-        return np.tile(q[held], repeat), np.tile(v[held], repeat), np.tile(a[held], repeat)
+        constrained, repeat = self._clamped_components, len(self.dofs) // len(self._clamped_components)
+        return np.tile(q[constrained], repeat), np.tile(v[constrained], repeat), np.tile(a[constrained], repeat)
 
     def rigid(self, relative: Array, t: float) -> tuple[Array, Array]:
         """Return (q, q̇) in inertial components of a shape given in the turning frame and at rest there."""

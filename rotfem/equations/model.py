@@ -167,7 +167,7 @@ class Model:
         """Return whether the force of a strain makes geometric stiffness in the prestressed linear theories."""
         usual = "axial" if self.structure.hinges else self.structure.prestress  # a hinge has no moment
         prestress = self.problem.prestress or usual
-        return prestress == "all" or strain.name in self.structure.prestressing
+        return prestress == "all" or strain.name in self.structure.prestress_strains
 
     def _switched(self, name: str, effect: bool, factor: Any) -> Any:
         """Return the switch of an effect, or of what a linear theory assembles by itself, times a factor."""

@@ -85,7 +85,7 @@ def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Pie
             switches[name].value = 0.0 if name in without else 1.0
         out = []
         for q in next(states for known, states in displaced if known is material):
-            pieces.prestressed.x.array[:] = q
+            pieces.prestress_displacement.x.array[:] = q
             out.append(pieces.assemble(compiled, "K"))
         return out
 
@@ -115,7 +115,9 @@ def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
             mixed.zeroEntries()
             for p, factor in zip(group, random.uniform(0.5, 1.5, len(group)), strict=True):
                 mixed.axpy(factor, p.operator)
-            (pieces.prestressed.x.array[:],) = _displaced(pieces, material, [replace(group[0], operator=mixed)])
+            (pieces.prestress_displacement.x.array[:],) = _displaced(
+                pieces, material, [replace(group[0], operator=mixed)]
+            )
             if pieces.assemble(compiled, "K").norm() == 0.0:
                 continue
         out += group
@@ -213,7 +215,9 @@ class Pieces:
         self.at_rest, self._forms = model.derived_forms("pieces", self._made)
         symbols = self.structure.section | self.structure.scalars | model.switches
         purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
-        known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
+        known, compiled = model.derived_forms(
+            purpose, self._made_geometric, (self.prestress_displacement, *symbols.values())
+        )
         self._forms |= compiled
         self.assembler = Assembler(self._forms["K"], [])
         large = self.assembler.pattern.getSize()[0] > SMALL
@@ -243,7 +247,7 @@ class Pieces:
         """Return the geometric stiffness likewise, if there is one."""
         u, w, theory, form = ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.model.theory, 0
         if theory.prestress:
-            form = geometric_stiffness(self.model, (self.q, self.prestressed), u, w, theory)
+            form = geometric_stiffness(self.model, (self.q, self.prestress_displacement), u, w, theory)
         return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
 
     def _narrow(self) -> None:
@@ -251,7 +255,7 @@ class Pieces:
         started, random = perf_counter(), np.random.default_rng(1)
         self._set_switches(self.model.switches)
         self._set_constants({e: random.uniform(0.5, 1.5) for name in self.constants for e in self._entries(name)})
-        self.prestressed.x.array[:] = random.uniform(0.5, 1.5, len(self.prestressed.x.array))
+        self.prestress_displacement.x.array[:] = random.uniform(0.5, 1.5, len(self.prestress_displacement.x.array))
         several: dict[str, list[Any]] = {}
         for kind, form in self._forms.items():
             if kind != "f":
@@ -434,7 +438,7 @@ class Pieces:
         return K
 
     @cached_property
-    def prestressed(self) -> fem.Function:
+    def prestress_displacement(self) -> fem.Function:
         """The displacement of the linear structure that carries N⁰."""
         return fem.Function(self.V)
 

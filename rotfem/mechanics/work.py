@@ -201,15 +201,15 @@ class Mechanics:
         The turns are those from the hub: in a frame that does not rotate less its angle, in one that pitches flap and
         lag about axes that do not.
         """
-        held: list[RootSpring] = self.structure.springs()
+        springs: list[RootSpring] = self.structure.springs()
         if self.frame.fixed:
-            return [replace(s, x=s.x - self.frame.psi, drift=-self.frame.w[2]) for s in held]
-        turns = {s.axis: s.x for s in held}
+            return [replace(s, x=s.x - self.frame.psi, drift=-self.frame.w[2]) for s in springs]
+        turns = {s.axis: s.x for s in springs}
         if not self.frame.pitching or not {2, 3} <= turns.keys():
-            return held
+            return springs
         (c, s), (dc, ds), flap, lag = self.frame.pitch, self.frame.pitch_rate, turns[2], turns[3]
         still = {2: (c * flap - s * lag, dc * flap - ds * lag), 3: (c * lag + s * flap, dc * lag + ds * flap)}
-        return [replace(y, x=still[y.axis][0], drift=still[y.axis][1]) if y.axis in still else y for y in held]
+        return [replace(y, x=still[y.axis][0], drift=still[y.axis][1]) if y.axis in still else y for y in springs]
 
     def positions(self) -> list[Body]:
         """Return the bodies of the structure itself that are points of it, not directors: its axis or mid-surface."""

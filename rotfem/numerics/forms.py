@@ -51,15 +51,15 @@ class Assembler:
 
     def __init__(self, form: Any, bcs: list[Any]):
         own = self._own = fem.create_matrix(form, la.BlockMode.expanded)
-        self._held, dofmap = [bc._cpp_object for bc in bcs], form.function_spaces[0].dofmap
+        self._constraints, dofmap = [bc._cpp_object for bc in bcs], form.function_spaces[0].dofmap
         owned, nodes, self._block = own.index_map(0).size_local, dofmap.index_map, dofmap.index_map_bs
         self._comm, self._sizes = form.mesh.comm, ((owned, own.index_map(0).size_global),) * 2
         numbers = nodes.local_to_global(np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32))
         self._numbers = PETSc.LGMap().create(numbers.astype(PETSc.IntType), bsize=self._block, comm=self._comm)
         rows = np.array(own.indptr[: owned + 1], PETSc.IntType)
         columns = own.index_map(1).local_to_global(own.indices[: rows[-1]]).astype(PETSc.IntType)
-        held = [dof for bc in bcs for dof in bc.dof_indices()[0] if dof < owned]
-        at = [rows[dof] + np.searchsorted(own.indices[rows[dof] : rows[dof + 1]], dof) for dof in held]
+        constrained = [dof for bc in bcs for dof in bc.dof_indices()[0] if dof < owned]
+        at = [rows[dof] + np.searchsorted(own.indices[rows[dof] : rows[dof + 1]], dof) for dof in constrained]
         self._diagonal, self._all = np.array(at, dtype=np.intp), np.asarray(own.data)
         self._entries = self._all[: rows[-1]]  # the owned ones
         #: By kind of matrix, that of all others "K": the places of its entries in the whole pattern, rows and columns.
@@ -81,7 +81,7 @@ class Assembler:
         Args:
             several: the forms.
             kind: of the matrix.
-            diagonal: of the rows and columns of what is held, zero otherwise; None where nothing is held.
+            diagonal: of the rows and columns of constrained unknowns, zero otherwise; None without constraints.
             into: a matrix that `zero` has made, to be overwritten; a new one if None.
         """
         entries, (kept, *csr) = self._assembled(*several, diagonal=diagonal), self._pattern(kind)
@@ -122,11 +122,11 @@ class Assembler:
 
     def _assembled(self, *several: Any, diagonal: float | None = None) -> Any:
         """Return the owned entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
-        A, held = self._own._cpp_object, [] if diagonal is None else self._held
+        A, constrained = self._own._cpp_object, [] if diagonal is None else self._constraints
         self._all.fill(0.0)
         for form in several:
             code = form._cpp_object
-            cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), held)
+            cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), constrained)
         if self._comm.size > 1:
             self._own.scatter_reverse()
         if diagonal is not None:

@@ -31,7 +31,7 @@ R = TypeVar("R")
 SAFETY = 2.0
 
 #: Largest number of answers.
-MOST = 8
+MOST_ANSWERS = 8
 
 #: Aim of the next answer, as a part of the allowed contribution.
 AIM = 0.5
@@ -373,7 +373,7 @@ def refine(
     """
     found = Refinement() if found is None else found
     following: Setting | None = first
-    while following is not None and len(found.tried) < MOST:
+    while following is not None and len(found.tried) < MOST_ANSWERS:
         setting, following, began = following, None, clock.used()
         try:
             clock.begin(setting.words(), len(found.tried) + 1, found.predicted(setting))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 #: Points of a line, and rows of a table, at most.
-MOST = 2000
+MOST_ROWS = 2000
 
 #: Largest displacement of a mode that moves, part of the length.
 AMPLITUDE = 0.15
@@ -170,7 +170,7 @@ def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
 
 def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a table that a click on a heading sorts; dictionaries in a row become columns of their own."""
-    flat = [dict(_flat(row)) for row in rows[:MOST]]
+    flat = [dict(_flat(row)) for row in rows[:MOST_ROWS]]
     names = list(dict.fromkeys(name for row in flat for name in row))
     if not flat:
         return ""
@@ -189,7 +189,7 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
             data = f' data-value="{value!r}"' if number and np.isfinite(float(str(value))) else ""
             cells += f"<td{_kind(flat, n)}{data}>{shown(0 if small else value)}</td>"
         body += f"<tr>{cells}</tr>"
-    more = f"<p>the first {MOST} of {len(rows)} rows</p>" if len(rows) > MOST else ""
+    more = f"<p>the first {MOST_ROWS} of {len(rows)} rows</p>" if len(rows) > MOST_ROWS else ""
     inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
     return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
 
@@ -351,9 +351,9 @@ def _text_at(axes: Any, line: Line2D, colour: str) -> str:
 
 
 def thinned(x: Array, y: Array) -> tuple[Any, Any]:
-    """Return a line by `MOST` at most: of every stretch its lowest and highest point."""
-    if len(x) > MOST:
-        parts = np.array_split(np.arange(len(x)), MOST // 2)
+    """Return a line by `MOST_ROWS` at most: of every stretch its lowest and highest point."""
+    if len(x) > MOST_ROWS:
+        parts = np.array_split(np.arange(len(x)), MOST_ROWS // 2)
         kept = sorted({int(part[i]) for part in parts for i in (np.argmin(y[part]), np.argmax(y[part]))})
         x, y = x[kept], y[kept]
     return x.astype(np.float32), y.astype(np.float32)

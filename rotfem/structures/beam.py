@@ -40,7 +40,7 @@ class Beam(Structure):
         nodes: places that must be nodes, m.
     """
 
-    prestressing: ClassVar[tuple[str, ...]] = ("axial",)
+    prestress_strains: ClassVar[tuple[str, ...]] = ("axial",)
     stiff: ClassVar[tuple[str, ...]] = ("axial", "shear", "shear_2", "shear_3", "section")
     #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]

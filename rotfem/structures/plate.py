@@ -147,7 +147,7 @@ class Plate(Structure):
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     planes: ClassVar = {2: (0, 1)}
     is_flat = True
-    prestressing: ClassVar = ("membrane",)
+    prestress_strains: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")

@@ -32,7 +32,7 @@ Array = npt.NDArray[np.float64]
 def check_memory(
     key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm, times: float = 1.0
 ) -> None:
-    """Refuse a mesh whose matrices cannot be held.
+    """Refuse a mesh whose matrices do not fit into memory.
 
     Args:
         key: what asks for so many elements.
@@ -151,7 +151,7 @@ class Structure:
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.
-    prestressing: ClassVar[tuple[str, ...]]
+    prestress_strains: ClassVar[tuple[str, ...]]
     #: What makes geometric stiffness unless a problem says it: "axial" forces, or "all" forces and moments.
     prestress: ClassVar[str] = "axial"
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
@@ -278,8 +278,8 @@ class Structure:
 
     def hinged_unknowns(self) -> npt.NDArray[np.intp]:
         """Return the local numbers of those of owned nodes that the clamp leaves free, in order."""
-        held = self._clamped_components()
-        return self._numbers(None, [i for i in range(self.size) if i not in held])
+        constrained = self._clamped_components()
+        return self._numbers(None, [i for i in range(self.size) if i not in constrained])
 
     def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.intp]:
         if nodes is None:
@@ -288,11 +288,11 @@ class Structure:
 
     def clamp_conditions(self) -> list[Any]:
         """Return the boundary conditions of the clamp."""
-        held = self._clamped_components()
-        if len(held) == self.size:
+        constrained = self._clamped_components()
+        if len(constrained) == self.size:
             return [fem.dirichletbc(fem.Function(self.V), self.clamped)]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, self.clamped * self.size + i, self.V.sub(i)) for i in held]
+        return [fem.dirichletbc(zero, self.clamped * self.size + i, self.V.sub(i)) for i in constrained]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""

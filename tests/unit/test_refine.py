@@ -15,7 +15,7 @@ from rotfem.commands.accuracy import Missed, to_accuracy
 from rotfem.errors import ComputationError, Stopped
 from rotfem.listeners import Compiling
 from rotfem.refinement.distance import distance
-from rotfem.refinement.refine import HIGHEST, MOST, SAFETY, Clock, OverBudget, Refinement, Setting, refine
+from rotfem.refinement.refine import HIGHEST, MOST_ANSWERS, SAFETY, Clock, OverBudget, Refinement, Setting, refine
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
@@ -220,15 +220,15 @@ def test_a_finer_setting_that_changes_nothing_is_the_last() -> None:
 
 def test_answers_end() -> None:
     """Each three quarters of the one before: never met."""
-    asked, attempt = attempts(*(result(0.75**i) for i in range(2 * MOST)))
+    asked, attempt = attempts(*(result(0.75**i) for i in range(2 * MOST_ANSWERS)))
     with pytest.raises(Missed):
         to_accuracy(SCENE, SETTING, attempt, clock())
-    assert len(asked) == MOST
+    assert len(asked) == MOST_ANSWERS
 
 
 def test_an_unknown_error_is_said_to_be_unknown() -> None:
     with pytest.raises(Missed, match=r"the error of what was reached is not known \(steps\)"):
-        to_accuracy(SCENE, SETTING, attempts(*[result(None)] * MOST)[1], clock())
+        to_accuracy(SCENE, SETTING, attempts(*[result(None)] * MOST_ANSWERS)[1], clock())
 
 
 def test_the_best_is_the_one_that_is_known() -> None:

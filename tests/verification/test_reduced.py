@@ -241,7 +241,7 @@ def test_a_reduced_model_needs_a_linear_theory(spin_up: MakeScene) -> None:
 
 def test_the_basis_is_checked(spin_up: MakeScene, monkeypatch: pytest.MonkeyPatch) -> None:
     """A basis that may not grow is seen to be too small, and the full system is used and said."""
-    monkeypatch.setattr(response, "MOST", 1)
+    monkeypatch.setattr(response, "MOST_COLUMNS", 1)
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True}
     scene = spin_up(changes, time={"end": 1.0, "step": 0.02}, mesh={"elements": 4}, loads={"tip_force": GUST})
     result = run(scene)

@@ -26,7 +26,7 @@ from rotfem.analysis.reduced.solution import Solution, States, cut
 Array = npt.NDArray[np.float64]
 
 #: Most columns of a basis.
-MOST = 60
+MOST_COLUMNS = 60
 
 #: Part of an accuracy below which a shape is of no account, as a part of the motion.
 NEGLIGIBLE = 0.01
@@ -97,7 +97,7 @@ def reduced_response(
 ) -> Response:
     """Return the history of a linear theory by a reduced model, from rest in the turning frame.
 
-    Each round adds six shapes to the basis, up to MOST columns; 64 steps are halved ten times at most.
+    Each round adds six shapes to the basis, up to MOST_COLUMNS columns; 64 steps are halved ten times at most.
 
     Args:
         system: equations of a linear theory, bordered if its hub is free.
@@ -128,7 +128,7 @@ def reduced_response(
         tips = states[0] @ model.tips().T
         if before is not None:
             basis_error = difference(tips, before)
-        if basis_error <= accuracy or model.size >= MOST:
+        if basis_error <= accuracy or model.size >= MOST_COLUMNS:
             break
         before = tips
         if model.grow(growth.lacking(equations, solution, states), 6, NEGLIGIBLE * accuracy, states[0]) == 0:

@@ -134,15 +134,15 @@ class Cells:
         graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(size, size))
         parts, part = connected_components(graph, directed=False)
         edges = np.searchsorted(keys, self.key(clamp))
-        held = np.zeros(parts, dtype=bool)
-        held[part[cells[first[edges]]]] = True
-        held[part[cells[first[edges] + count[edges] - 1]]] = True
-        loose = np.flatnonzero(~held[part])
+        supported = np.zeros(parts, dtype=bool)
+        supported[part[cells[first[edges]]]] = True
+        supported[part[cells[first[edges] + count[edges] - 1]]] = True
+        loose = np.flatnonzero(~supported[part])
         if not len(loose):
             return
         x = self.x[self.corners[part == part[loose[0]]]].reshape(-1, 2)
         low, high = x.min(axis=0), x.max(axis=0)
-        several = parts - int(held.sum())
+        several = parts - int(supported.sum())
         where = f"at {low[0]:.4g} ≤ x ≤ {high[0]:.4g} m, {low[1]:.4g} ≤ y ≤ {high[1]:.4g} m"
         raise BadMesh(
             f'{len(loose)} of its {size} cells are not connected to the curve "clamped", '
@@ -224,7 +224,7 @@ HEAD = re.compile(
 )
 
 #: Largest number of a node.
-MOST = 10**8
+LARGEST_NUMBER = 10**8
 
 #: What gmsh may need to read a file: seconds, one more for so many bytes of it, and bytes of memory.
 SECONDS, BYTES_PER_SECOND, MEMORY = 20.0, 5e5, 1e9
@@ -262,8 +262,8 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
         raise BadMesh("it holds cells of dimension 3; a plate is a mesh of triangles or quadrilaterals in a plane")
     _check_names(groups, surfaces)
     x = x.reshape(-1, 3)
-    if numbers.max() > MOST:
-        raise BadMesh(f"has a node of the number {numbers.max()}; numbers can be up to {MOST}")
+    if numbers.max() > LARGEST_NUMBER:
+        raise BadMesh(f"has a node of the number {numbers.max()}; numbers can be up to {LARGEST_NUMBER}")
     rows = np.full(int(numbers.max()) + 1, -1, dtype=np.int64)  # of x, by the number of a node in the file
     rows[numbers.astype(np.int64)] = np.arange(len(numbers))
     kind, found, nodes = _cells(gmsh, {name: groups[2][name] for name in surfaces}, rows)
