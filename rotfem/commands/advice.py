@@ -64,7 +64,7 @@ def _nodes(scene: Scene) -> list[str]:
 
 
 def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
-    """Return hints about what a history starts from: where that rings for ever, or never moves."""
+    """Return hints about the start of a history: where it rings, or never moves."""
     initial = scene.initial
     if scene.time is None or initial.tip_displacement is not None or not act_at_start(problem):
         return []
@@ -78,7 +78,7 @@ def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
 
 
 def frozen_inputs(problem: Problem) -> list[str]:
-    """Return warnings where what is computed at one time, as modes are, has motion, gravity and loads as at t = 0."""
+    """Return warnings of motion, gravity and loads over time, which are taken as at t = 0."""
     given = {name: load.unpitched or load for name, load in problem.loads.named.items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]

@@ -75,7 +75,7 @@ def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `explain` prints before and after its tables."""
     absent = ", ".join(f"{name} ({why})" for name, why in s["absent_effects"].items())
-    after = [*choice_report(s), *([f"effects this scene has not: {absent}"] if absent else [])]
+    after = [*choice_report(s), *([f"effects without data: {absent}"] if absent else [])]
     return [f"{s['name']}: {s['theory']} theory, in {s['timings']['total']:.2f} s", effects(s)], after
 
 

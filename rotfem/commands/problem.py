@@ -1,4 +1,4 @@
-"""The problem of a scene, the verbs that a script has on one, march, steady, modes and system, and what they yield."""
+"""The problem of a scene, with its verbs for scripts: march, steady, modes and system."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def hub_values(system: Any, state: State) -> dict[str, float]:
 
 
 def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
-    """Return the shape that a motion starts from (local dof array), and let the system count its rotations as it does.
+    """Return the shape that a motion starts from (local dof array), and set the reference rotation of the system.
 
     Args:
         system: equations of the motion.
@@ -290,7 +290,7 @@ class Problem(ProblemData):
 
 
 def first_motion(scene: Scene) -> FirstMotion | None:
-    """Return what the history of a scene starts with in addition to its first state; None where it starts at rest."""
+    """Return the initial motion of a scene; None if it starts at rest."""
     said = scene.initial
     if not said.moves:
         return None
@@ -373,7 +373,7 @@ def cell_of(time: Time | None) -> float | None:
 
 
 def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
-    """Return the angle that a harmonic is a cosine of, but for its phase, and its rates."""
+    """Return the argument of a harmonic's cosine without its phase, and its two rates."""
     if harmonic.per_rev is None:
         omega = harmonic.frequency
         return (lambda t: omega * t), (lambda t: omega), (lambda t: 0.0)
@@ -408,7 +408,7 @@ def load_of(key: str, given: Any, structure: Any, motion: Motion | None = None, 
         key: of the scene.
         given: what the scene has there.
         structure: of the scene.
-        motion: of the hub, which harmonics of its angle need.
+        motion: of the hub, for harmonics of its angle.
         kind: "dead" or "follower".
     """
     planar = structure.is_planar

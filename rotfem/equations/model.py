@@ -58,20 +58,20 @@ class HubAngle:
         )
 
     def start(self) -> None:
-        """Put the hub back to where it starts."""
+        """Reset the hub to its start."""
         self.values[:] = 0.0, self.hub.speed, 0.0
 
 
 class Model:
     """The terms of a problem, each the virtual work of an effect.
 
-    Every effect has a switch: a constant, 1 or 0, that multiplies its work and the densities of the bodies it brings.
-    To try a model without an effect its switch is set; an effect that is not in the model leaves no term, no constant
-    and no kernel behind. In the linear theories all terms have switches, so that each can be assembled by itself.
+    Every effect has a switch: a constant, 1 or 0, that multiplies its work and the densities of its bodies. An effect
+    that is not in the model has no term, no constant and no kernel. In the linear theories all terms have switches, so
+    that each can be assembled by itself.
 
     Attributes:
         structure: mesh, space, bodies.
-        effects: names of the effects that are in.
+        effects: names of the effects in the model.
         motion: of the frame; that of a free hub reads its unknown.
         hub: angle of a free hub; None if the rotation is prescribed.
         frame: constants w, dw, a_o, gravity in use.
@@ -80,9 +80,9 @@ class Model:
         switches: name ↦ constant factor.
         terms: name ↦ virtual work, a UFL form.
         residual: their sum F(q, v, a; δq), a UFL form.
-        compositions: how often they were written.
-        time: that constants are set to, s.
-        shown: the same, how signals are seen, and effects left out; None of another motion than the problem's.
+        compositions: number of times they were written: once more at the first reference rotation.
+        time: of the constants, s.
+        shown: time, view and effects left out of the constants; None for another motion than the problem's.
     """
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
@@ -105,7 +105,7 @@ class Model:
         self.compose()
 
     def compose(self) -> None:
-        """Write the mechanics and the terms, or write them anew where the structure counts its rotations otherwise."""
+        """Write the mechanics and the terms; again after a change of the reference rotation."""
         s, theory = self.structure, self.theory
         bodies = [
             replace(b, density=self._switched(b.effect or "structure", bool(b.effect), b.density))
@@ -130,7 +130,7 @@ class Model:
             raise
 
     def check_smooth(self) -> None:
-        """Refuse terms of a user whose derivative to the velocities does not exist where these are zero, as of |v| v.
+        """Refuse terms of a user that are not differentiable at zero velocities, as |v| v.
 
         Raises:
             InputError: names the term.
@@ -160,17 +160,17 @@ class Model:
         return self.with_gains(self.structure.strains(measures), first_order)
 
     def with_gains(self, strains: list[Strain], first_order: bool) -> list[Strain]:
-        """Return strains with what the effects that are in add to them, each times its switch."""
+        """Return strains with the gains of the model's effects, each times its switch."""
         return [s.gaining(self.effects, lambda name, x: self._switched(name, True, x), first_order) for s in strains]
 
     def prestresses(self, strain: Strain) -> bool:
-        """Return whether the force of a strain makes geometric stiffness in the prestressed linear theories."""
+        """Return whether the force of a strain is in the geometric stiffness of the prestressed linear theories."""
         usual = "axial" if self.structure.hinges else self.structure.prestress  # a hinge has no moment
         prestress = self.problem.prestress or usual
         return prestress == "all" or strain.name in self.structure.prestress_strains
 
     def _switched(self, name: str, effect: bool, factor: Any) -> Any:
-        """Return the switch of an effect, or of what a linear theory assembles by itself, times a factor."""
+        """Return the switch of an effect, or of a part that a linear theory assembles by itself, times a factor."""
         if not (effect or self.theory.linear):
             return factor
         if name not in self.switches:
@@ -195,15 +195,12 @@ class Model:
         return out
 
     def derived_forms(self, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
-        """Return forms that follow from the residual and their purpose alone; once made, they serve other meshes too.
-
-        UFL takes longer to derive them than to compute with them on a small mesh. Which they are follows from the
-        signature of the residual, in which coefficients and constants stand for their places.
+        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
 
         Args:
             purpose: which forms.
             make: derives and compiles them.
-            more: functions and constants that they can have beyond those of the residual, always in one order.
+            more: further functions and constants of the forms, always in one order.
         """
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
@@ -254,9 +251,9 @@ class Model:
         return out
 
     def energy(self) -> Any:
-        """Return the UFL form of the energy that the terms with one belong to (J): the Jacobi integral.
+        """Return the UFL form of the energy of the conservative terms (J): the Jacobi integral.
 
-        In a frame that does not rotate it is the energy of the structure, to which the motion of the clamp gives work.
+        In a frame that does not rotate it is the energy of the structure, on which the motion of the clamp works.
         """
         parts = self.energies()
         H = parts["T2"] + parts["strain"]
@@ -268,7 +265,7 @@ class Model:
         return H + sum(ufl.inner(load.force, load.x) * load.measure for load in astray) if astray else H
 
     def terms_without_energy(self) -> list[Any]:
-        """Return the terms that no part of the `energy` belongs to, as damping and followers; UFL forms."""
+        """Return the terms without `energy`, as damping and followers; UFL forms."""
         stored = (INTERNAL.name, INERTIA.name)
         out = [
             term
@@ -282,7 +279,7 @@ class Model:
 
     @cached_property
     def closed(self) -> bool:
-        """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""
+        """Whether nothing adds energy to the structure: its Jacobi integral is constant, or falls by damping."""
         motion, turning = self.motion, self.problem.gravity_turns
         steady = all(load.is_zero or load.constant for load in self.problem.loads.named.values())
         dead = all(load.dead and load.conservative for load in self.mechanics.loads)
@@ -291,7 +288,7 @@ class Model:
         return motion.hub is None and motion.constant and not (turning or sprung) and steady and dead and known
 
     def outputs(self) -> dict[str, Any]:
-        """Return name ↦ UFL form of the functionals that are to be recorded."""
+        """Return name ↦ UFL form of the outputs."""
         out = {}
         for name, form in self.problem.outputs.items():
             with called(f"outputs.{name}", "the function"):
@@ -299,7 +296,7 @@ class Model:
         return out
 
     def inside_out(self) -> bool:
-        """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
+        """Return whether the stretch is anywhere ≤ 0 at the state in q."""
         if self.comm.allreduce(self.structure.hardly_moved(), op=MPI.LAND):
             return False
         return self.stretches()[0] <= 0.0

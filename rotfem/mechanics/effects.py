@@ -1,8 +1,8 @@
-"""Effects: what acts on the bodies of a structure, each in the equations or not.
+"""Effects: the terms of the equations that can be switched on and off.
 
-An effect says its virtual work for a free variation: that of the unknowns gives the equations of motion, a rigid turn
-about the axis gives the row of a free hub. Effects without work of their own bring bodies, which feel all others, add
-to strains, or couple the hub. Nothing here loads UFL: what an effect computes with is loaded when a form is made of it.
+An effect has virtual work for any variation: that of the unknowns gives the equations of motion, a rigid turn about the
+axis the row of a free hub. Effects without work of their own add bodies, on which all others act, add to strains, or
+couple the hub. UFL is not imported here: the work of an effect is imported when a form needs it.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ class Effect:
     Attributes:
         name: what a scene calls it.
         work: (mechanics, variation) ↦ its term of the residual F = 0 for a variation of the motion: + ∫ ρ a·δx of an
-            acceleration, − ∫ f·δx of a force. None where the effect only brings bodies, adds to strains, or couples
+            acceleration, − ∫ f·δx of a force. None if the effect only adds bodies, adds to strains, or couples
             the hub.
-        present: problem ↦ whether there are data for it; `model.effects = "auto"` takes all that are present.
+        present: problem ↦ whether it has data; `model.effects = "auto"` takes all that have.
         reasons: why it is in a model, and why not, in a few words.
         constants: names of the constants ("w", "dw", "a_o", "gravity" of the frame, "loads" for those of all
             loads) that its work is a product of; () if it has none of them, None if it may be any polynomial of second
             degree in them.
-        of_rotation: whether it comes of the rotation of the frame, so that a frame that does not rotate has it not.
+        of_rotation: whether it is by the rotation of the frame, and absent in a frame that does not rotate.
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
             impulse that hub and structure are given.
-        passive: whether its forces store energy or take it, and never give any that was not there.
-        at_root: whether its forces act between the hub and the root only, and are what the hub exerts there.
-        kinetic: the part "T1" or "T0" of the kinetic energy that belongs to it.
+        passive: whether its forces store or dissipate energy, and never add any.
+        at_root: whether its forces act between the hub and the root only.
+        kinetic: its part of the kinetic energy, "T1" or "T0".
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
     """
 
@@ -78,7 +78,7 @@ class DampingModel:
         name: the key.
         work: (mechanics, variation, coefficient) ↦ its term of the residual, + the work of the damping forces. They act
             between parts of the structure and depend on rates relative to the frame; the coefficient is a constant.
-        what: what it is, and the unit of its coefficient.
+        what: description, with the unit of its coefficient.
     """
 
     registry: ClassVar[Registry[DampingModel]] = damping_models

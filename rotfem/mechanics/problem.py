@@ -1,4 +1,4 @@
-"""The problem: what is to be computed, between what a user says and the equations."""
+"""The problem: structure, theory, effects, motion and loads, between the scene and the equations."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rotfem.registry import Registry
 from rotfem.registry import outputs as registered
 from rotfem.short import short_fields
 
-#: Part of a vector across an axis that it is along all the same, to the digits that people type.
+#: Relative component across an axis up to which a vector counts as along it.
 ALONG = 1e-6
 
 #: mechanics ↦ functional of the motion, a UFL form without arguments; see `rotfem.mechanics.work.Mechanics`.

@@ -1,7 +1,7 @@
-"""The ladder of theories: each is a set of strain measures; a linear one also says whose second order it prestresses.
+"""The ladder of theories: each is a set of strain measures; a linear one may have second-order ones for its prestress.
 
-Forces, tangents and geometric stiffness follow from the strains by differentiation (see `rotfem.equations`). Nothing
-here loads UFL: the strains are loaded when a form is made of them.
+Forces, tangents and geometric stiffness follow from the strains by differentiation (`rotfem.equations`). UFL is not
+imported here: strains are imported when a form needs them.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Theory:
             plate in an exact theory takes the director as a second argument, None for that of the angles in q.
         linear: whether the equations of motion are linear in q.
         exact: whether displacements and rotations may be of any size.
-        prestress: for a linear theory, second-order strains by structure type, which meet the force of the spinning
-            linear structure in the geometric stiffness; empty leaves that stiffness out.
-        poorer: cheaper theories of its own family, cheapest first, to choose from in its place.
+        prestress: for a linear theory, second-order strains by structure type, of its geometric stiffness under the
+            forces of the spinning linear structure; empty for none.
+        poorer: cheaper theories of its own family, cheapest first, which `model.tolerance` may take instead.
         quick: whether a quick study of cost tries it.
     """
 
@@ -80,11 +80,10 @@ def stiffened() -> Theory:
 
 
 def compared(theory: Theory, structure: str) -> Theory | None:
-    """Return the theory whose answers those of another one are compared with, to know the error of that.
+    """Return the richer theory that a theory is compared with, for its error; None without one.
 
-    It has the terms whose effect adds up over the time: stress stiffness, which linear theories may lack, and third
-    order, which nonlinear ones of moderate rotations lack. None of an exact theory, of a linear one that has stress
-    stiffness, and where the richer one has no strains.
+    It has the terms whose error accumulates over time: stress stiffness, which `linear` lacks, and third order, which
+    nonlinear theories of moderate rotations lack. None for exact theories and linear ones with stress stiffness.
     """
     if theory.exact or (theory.linear and theory.prestress):
         return None

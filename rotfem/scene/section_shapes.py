@@ -57,7 +57,7 @@ class Shape:
         dimensions: keys of its dimensions (m), each a number or a taper greater than 0.
         geometry: (nu, **dimensions) ↦ properties; ν and the dimensions are arrays over positions along the beam.
         alternatives: further complete sets of keys, any of which may be given instead of `dimensions`.
-        check: dimensions ↦ what is allowed, by name of those that are not; asked at the knots of all tapers.
+        check: dimensions ↦ what is allowed, by name of those that are not; called with their values at all knots.
     """
 
     registry: ClassVar[Registry[Shape]] = registered

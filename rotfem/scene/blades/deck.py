@@ -213,8 +213,8 @@ class BladeFormat:
 
     Attributes:
         name: what `section.format` calls it.
-        what: which files these are, in words.
-        recognises: whether a file says that it is one of these.
+        what: description of the files.
+        recognises: file ↦ whether it has the format.
         read: (file, what the scene gives in addition) ↦ keys of [structure], section among them.
     """
 
