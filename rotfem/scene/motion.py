@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, ValidationInfo
+from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo
 
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
@@ -160,6 +160,8 @@ class LawMotion(WithParameters, Motion):
     Attributes:
         type: name of the law.
     """
+
+    model_config = ConfigDict(extra="allow")  # pydantic takes that of the last base
 
     CHOICE, ENTRIES = "type", motion_laws
 
