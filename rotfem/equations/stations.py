@@ -30,8 +30,10 @@ from dolfinx import fem, la
 from ufl.algorithms import expand_derivatives
 
 from rotfem.numerics import forms
+from rotfem.numerics.projection import summed
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 from rotfem.structures.beam import Beam
+from rotfem.structures.structure import PointValues
 
 Array = npt.NDArray[np.float64]
 
@@ -113,7 +115,7 @@ class Stations:
     # --- where ----------------------------------------------------------------------------------------------------
 
     def _place(self) -> None:
-        """Find the cells of all stations, and the weights of Gauss points and nodes in their values."""
+        """Find the cells of all stations, and the weights of Gauss points in their values."""
         mesh, comm = self.beam.mesh, self.comm
         owned = mesh.topology.index_map(1).size_local
         ends = mesh.geometry.x[mesh.geometry.dofmap[:owned], 0].reshape(-1, 2)
@@ -139,7 +141,7 @@ class Stations:
         here = owner[needed] == comm.rank
         self._rows, self._cells = np.flatnonzero(here), local[needed[here]].astype(np.int32)
         self._shape = len(needed), self.degree
-        self._interpolate(found, cells, owner, local)
+        self._at = [PointValues(self.system.V, np.array([x, 0.0, 0.0])) for x in self.positions]
 
     def _around(self, cell: int, smooth: Array) -> list[int]:
         """Return places, from the root on, of the Gauss points of a cell and of the two nearest ones, one on each side.
@@ -152,16 +154,6 @@ class Stations:
             for places in ((own[0] - 1, own[0] - 2), (own[-1] + 1, own[-1] + 2))
         )
         return own + ([low[0], high[0]] if low and high else low or high)
-
-    def _interpolate(self, found: Array, cells: Array, owner: Array, local: Array) -> None:
-        """Find the nodes and the values of their functions at the stations in cells of this process."""
-        element, dofmap = self.system.V.element.basix_element, self.system.V.dofmap
-        self._nodal: list[tuple[int, Array, Array]] = []
-        for row, (c, x) in enumerate(zip(found, self.positions, strict=True)):
-            if owner[c] == self.comm.rank:
-                at = (x - cells[c, 0]) / (cells[c, 1] - cells[c, 0])
-                values = element.tabulate(0, np.array([[at]]))[0, 0, :, 0]
-                self._nodal.append((row, dofmap.cell_dofs(int(local[c])), values))
 
     # --- what -----------------------------------------------------------------------------------------------------
 
@@ -196,9 +188,9 @@ class Stations:
             values[self._rows] = found.reshape(len(self._cells), self.degree, -1)
         out: Array = np.zeros((len(self.positions), len(self.names)))
         out[:, self._order] = np.tensordot(self._stress, values, 2)
-        for row, nodes, factors in self._nodal:
-            out[row, self._order.stop :] = self.beam.whole_values(factors @ q.reshape(-1, self.beam.size)[nodes])
-        return np.asarray(self.comm.allreduce(out) if self.comm.size > 1 else out)
+        out = summed(self.comm, out)
+        out[:, self._order.stop :] = [self.beam.whole_values(value(q)) for value in self._at]
+        return out
 
     def __call__(self) -> Array:
         """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""

@@ -20,11 +20,11 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, RootSpring, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
-from rotfem.structures.meshes.plate_mesh import beam_nodes
+from rotfem.structures.meshes.plate_mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative
-from rotfem.structures.structure import Array, Structure, TipValues, check_memory
+from rotfem.structures.structure import Array, PointValues, Structure, check_memory
 
 
 class Beam(Structure):
@@ -70,17 +70,11 @@ class Beam(Structure):
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
-        near = self.length * ONE
-        facets = [
-            mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.abs(p[0] - x) < near)
-            for x in (self.length, 0.0)
-        ]
-        both, order = np.unique(np.concatenate(facets), return_index=True)
-        tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(facet) for facet in facets])[order]
-        at = mesh.meshtags(self.mesh, 0, both, tags)
+        near = [lambda p, x=x: np.abs(p[0] - x) < self.length * ONE for x in (self.length, 0.0)]
+        at = boundary_tags(self.mesh, 0, near)
         self.tip, self.root = (ufl.ds(tag, domain=self.mesh, subdomain_data=at) for tag in (1, 2))
-        self.clamped = fem.locate_dofs_topological(self.V, 0, facets[1])
-        self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
+        self.clamped = fem.locate_dofs_topological(self.V, 0, at.find(2))
+        self.tip_values = PointValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     def _radius(self) -> float:
         """Return √(EI/EA) at the clamp, of the least of the bending stiffnesses, m; 0 of a beam without a section."""

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import entities_to_geometry
 from mpi4py import MPI
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
@@ -32,7 +31,7 @@ from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.section_fields import field_values
-from rotfem.structures.structure import Array, Structure, TipValues, check_memory
+from rotfem.structures.structure import Array, PointValues, Structure, check_memory
 
 
 def plate_points(plate: Structure) -> Points:
@@ -183,7 +182,7 @@ class Plate(Structure):
         self._has_tip = "tip" in self.grid.curve_names
         self.root = self.grid.along("clamped")
         self.tip = self.grid.along("tip") if self._has_tip else None
-        self.tip_values = TipValues(self.V, self._tip_point(low, high))
+        self.tip_values = PointValues(self.V, self._tip_point(low, high))
         self._properties()
         self.turns = DirectorTurns.of(self) if self.size == len(self.components) else None
 
@@ -207,21 +206,15 @@ class Plate(Structure):
             return np.array([self.data.length, 0.0, 0.0])
         x = self.V.tabulate_dof_coordinates()
         if self._has_tip:
-            return self._middle(self.grid.edges("tip"))
-        clamp = np.concatenate(self.comm.allgather(x[self.clamped]))
-        distance = np.full(len(x), np.inf)
-        for part in np.array_split(clamp, max(1, len(clamp) // 200)):
-            distance = np.minimum(distance, np.linalg.norm(x[:, None] - part[None], axis=2).min(axis=1))
+            return self._middle(*np.moveaxis(self.grid.ends("tip")[..., :2], 1, 0))
+        distance = KDTree(np.concatenate(self.comm.allgather(x[self.clamped]))).query(x)[0]
         best = int(np.argmax(distance)) if len(x) else 0
         candidates = self.comm.allgather((float(distance[best]), *map(float, x[best])) if len(x) else (-1.0, 0, 0, 0))
         return np.array(max(candidates)[1:])
 
-    def _middle(self, edges: Any) -> Array:
-        """Return the point of a curve, local edges, that is nearest to its centre of length, m."""
-        own = edges[edges < self.mesh.topology.index_map(1).size_local]
-        nodes = entities_to_geometry(self.mesh, 1, own)[:, :2] if len(own) else np.empty((0, 2), dtype=int)
-        ends = self.mesh.geometry.x[nodes]
-        a, b = np.moveaxis(np.concatenate(self.comm.allgather(ends)), 1, 0)
+    @staticmethod
+    def _middle(a: Array, b: Array) -> Array:
+        """Return the point of a curve, edges from a to b (n, 2), that is nearest to its centre of length, m."""
         length = np.linalg.norm(b - a, axis=1)
         centre = length @ (a + b) / (2 * length.sum())
         along = np.clip(np.sum((centre - a) * (b - a), axis=1) / length**2, 0.0, 1.0)

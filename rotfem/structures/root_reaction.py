@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import mesh as dolfinx_mesh
 
 from rotfem.mechanics.rotations import turned_vectors
 
@@ -116,16 +115,9 @@ class RootReaction:
 
     def _middle(self) -> Array:
         """Return the middle of what is clamped, of edges weighed by their length, (3,) in m."""
-        s, grid = self._structure, getattr(self._structure, "grid", None)
+        grid = getattr(self._structure, "grid", None)
         if grid is None:
             return np.zeros(3)
-        edges, owned = grid.edges("clamped"), s.mesh.topology.index_map(1).size_local
-        s.mesh.topology.create_connectivity(1, 0)
-        edges = edges[edges < owned]
-        ends = np.zeros((0, 2, 3))
-        if len(edges):  # dolfinx divides by their number
-            ends = s.mesh.geometry.x[dolfinx_mesh.entities_to_geometry(s.mesh, 1, edges)].reshape(-1, 2, 3)
+        ends = grid.ends("clamped")
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        here = np.append(lengths @ ends.mean(axis=1), lengths.sum())
-        whole = s.comm.allreduce(here) if s.comm.size > 1 else here
-        return np.asarray(whole[:3] / whole[3])
+        return np.asarray(lengths @ ends.mean(axis=1) / lengths.sum())

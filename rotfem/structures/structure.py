@@ -82,7 +82,7 @@ def memory() -> float:
         return machine
 
 
-class TipValues:
+class PointValues:
     """Reads a blocked Lagrange function at a point: Σ_k φ_k q_k over the nodes of a cell that holds it.
 
     That of the nearest node if no cell does, as at a curved edge.
@@ -163,7 +163,7 @@ class Structure:
     points: Points
     root: Any
     clamped: npt.NDArray[np.int32]
-    tip_values: TipValues
+    tip_values: PointValues
     length: float
     #: Radius of gyration of the section at the clamp, √(EI/EA) (m); 0 where there is none.
     radius: float = 0.0

@@ -20,6 +20,14 @@ from rotfem.places import ONE, apart
 from rotfem.structures.meshes.gmsh_file import BadMesh, read
 
 
+def boundary_tags(domain: Any, dimension: int, places: Sequence[Any]) -> Any:
+    """Return tags 1, 2, … of what lies on the boundary of a mesh where each of some functions of points holds."""
+    found = [mesh.locate_entities_boundary(domain, dimension, at) for at in places]
+    entities, order = np.unique(np.concatenate(found), return_index=True)
+    tags = np.repeat(np.arange(1, len(found) + 1, dtype=np.int32), [len(part) for part in found])
+    return mesh.meshtags(domain, dimension, entities, tags[order])
+
+
 def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
     """Return elements + 1 node positions on [0, length], evenly spaced between knots that are all nodes (m)."""
     stations = np.array([0.0, *knots, length])
@@ -61,6 +69,14 @@ class PlateGrid:
         """Return the local edges of a named curve."""
         return np.asarray(self.curves.find(self.curve_names[name]), dtype=np.int32)
 
+    def ends(self, name: str) -> Array:
+        """Return the ends of the edges of a named curve, of all processes, (n, 2, 3) in m."""
+        edges = self.edges(name)
+        own = edges[edges < self.mesh.topology.index_map(1).size_local]
+        self.mesh.topology.create_connectivity(1, 0)
+        nodes = mesh.entities_to_geometry(self.mesh, 1, own)[:, :2] if len(own) else np.empty((0, 2), dtype=int)
+        return np.concatenate(self.mesh.comm.allgather(self.mesh.geometry.x[nodes]))
+
     def along(self, name: str) -> Any:
         """Return the measure of a named curve, on the boundary or inside."""
         return ufl.ds(self.curve_names[name], domain=self.mesh, subdomain_data=self.curves)
@@ -94,17 +110,10 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] 
     x = out.geometry.x
     x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, data.length, len(lines)), lines)
     out.topology.create_connectivity(1, 2)
-    names = {name: i for i, name in enumerate(EDGES, start=1)}
-    edges, tags = [], []
-    for name, (axis, end) in EDGES.items():
-        at, near = (corners[0][axis], corners[1][axis])[end], ONE * (corners[1][axis] - corners[0][axis])
-        found = mesh.locate_entities_boundary(
-            out, 1, lambda p, axis=axis, at=at, near=near: np.abs(p[axis] - at) < near
-        )
-        edges.append(found)
-        tags.append(np.full(len(found), names[name], dtype=np.int32))
-    flat, order = np.unique(np.concatenate(edges), return_index=True)
-    return PlateGrid(out, mesh.meshtags(out, 1, flat, np.concatenate(tags)[order]), names)
+    near, edges = ONE * (corners[1] - corners[0]), list[Any]()
+    for axis, end in EDGES.values():
+        edges.append(lambda p, i=axis, at=corners[end][axis]: np.abs(p[i] - at) < near[i])
+    return PlateGrid(out, boundary_tags(out, 1, edges), {name: i for i, name in enumerate(EDGES, start=1)})
 
 
 def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
