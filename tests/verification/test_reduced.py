@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rotfem import SceneError, explain, run
+from rotfem import ComputationError, SceneError, explain, run
 from rotfem.analysis.reduced import response
 from rotfem.analysis.reduced.solution import Solution, cut, functions
 from rotfem.commands.problem import Problem
@@ -81,6 +81,17 @@ def test_solution_is_of_fourth_order_with_matrices_that_change() -> None:
     assert np.all(orders[:2] > 3.8)
     assert errors[1][0] < 1e-5
     assert errors[1][2] < 1e-2  # accelerations too
+
+
+def test_a_single_step_that_is_not_found_is_a_failure() -> None:
+    """Masses three times that of the middle at the ends of the only step: Picard's iteration doubles its error."""
+
+    def operators(t: Array) -> tuple[Array, Array, Array, Array]:
+        one = np.ones((len(t), 1, 1))
+        return np.where(t == 0.5, 1.0, 3.0)[:, None, None] * one, 0 * one, one, np.ones((len(t), 1))
+
+    with pytest.raises(ComputationError, match="was not found"):
+        Solution(Oscillators(operators, constant=False), np.array([0.0, 1.0]), np.zeros(1), np.zeros(1))
 
 
 @pytest.mark.parametrize("damping", [0.3, 20.0, 40.0], ids=["light", "critical", "heavy"])

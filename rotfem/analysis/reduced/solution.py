@@ -193,6 +193,7 @@ class Solution:
         n = len(ends) - 1 if len(y) else 0
         first, width = 0, LARGEST if equations.constant else WINDOW
         while first < n:
+            width = min(width, n - first)
             with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has not converged
                 window = Window(equations, ends[first : first + width + 1], x)
             if window.converged:
@@ -202,7 +203,7 @@ class Solution:
             elif width == 1:
                 raise ComputationError("the motion of the reduced model was not found", time=float(ends[first]))
             else:
-                width = min(width, n - first) // 2
+                width //= 2
 
     @property
     def steps(self) -> int:
