@@ -129,7 +129,8 @@ class CompareResult(Rows):
                 scale = largest([row["reference"], row["value"]])
                 values = [number(row[name], scale) for name in ("reference", "value")]
                 last = f"{row['mac']:.3f}" if "mac" in row else per_cent(row.get(second))
-                rows.append((f"{row['quantity']} ({row['unit']})", *values, per_cent(row["difference"]), last))
+                unit = row["unit"] and f" ({row['unit']})"
+                rows.append((f"{row['quantity']}{unit}", *values, per_cent(row["difference"]), last))
             out.append(ShortTable((f"{title}", self.summary["name"], "value", "difference (%)", of), rows))
         return out
 
