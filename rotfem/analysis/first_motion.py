@@ -80,7 +80,7 @@ class FirstMotion:
         x = analysis.right(spinning)[:, number - 1]
         whole = with_ghosts(system.V, x.real) + 1j * with_ghosts(system.V, x.imag)
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
-        tip = (structure.tip_values(whole.real) + 1j * structure.tip_values(whole.imag))[moves]
+        tip = structure.tip_values(whole)[moves]
         largest = tip[np.argmax(np.abs(tip))]
         if abs(largest) <= 1e-6 * system.size(np.abs(whole)) * structure.length:  # it does not take part
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")

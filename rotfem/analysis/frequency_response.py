@@ -152,14 +152,8 @@ def tip_output(system: Any) -> Output:
     Args:
         system: equations of motion of the structure, the hub held.
     """
-    values, n = system.structure.tip_values, len(system.root.weights)  # without the angle of a free hub
-
-    def read(x: Array, s: complex) -> Array:
-        full = np.zeros(len(system.zeros()), dtype=np.complex128)
-        full[:n] = x[:n]
-        return np.asarray(values(full.real) + 1j * values(full.imag))
-
-    return Output(tuple(f"tip_{name}" for name in system.structure.components), read)
+    values = system.structure.tip_values
+    return Output(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
 
 
 def root_output(system: Any, push: Array) -> Output:

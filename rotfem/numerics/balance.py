@@ -7,8 +7,6 @@ condition a diagonal can give (van der Sluis 1969). All factors are powers of tw
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -37,9 +35,8 @@ def unknown_scale(M: Any, K: Any, unit: float) -> Any:
     return d
 
 
-@contextmanager
-def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> Iterator[Array]:
-    """Change M, C and K to u² D M D, u D C D and D K D and back again; yields the owned part of D.
+def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> tuple[tuple[Any, Any, Any], Array]:
+    """Return new matrices u² D M D, u D C D and D K D, and the owned part of D.
 
     Args:
         M: mass matrix.
@@ -49,17 +46,11 @@ def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> It
         scale: D, a PETSc vector of powers of two; that of the diagonal if None.
     """
     d = unknown_scale(M, K, unit) if scale is None else scale
-    inverse = d.duplicate()
-    inverse.array[:] = 1.0 / d.array
+    M, C, K = M.copy(), C.copy(), K.copy()
     for A, factor in ((M, unit**2), (C, unit), (K, 1.0)):
         A.diagonalScale(d, d)
         A.scale(factor)
-    try:
-        yield d.array.copy()
-    finally:  # exact, as all factors are powers of two
-        for A, factor in ((M, unit**2), (C, unit), (K, 1.0)):
-            A.scale(1.0 / factor)
-            A.diagonalScale(inverse, inverse)
+    return (M, C, K), d.array.copy()
 
 
 def least_frequency(M: Any, K: Any, ksp: Any) -> float:

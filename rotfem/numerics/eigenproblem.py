@@ -371,10 +371,9 @@ class Pencil(Sendable):
         undamped._judged = False  # they only begin the basis
         shapes = undamped.solve(count + MORE, target).right
         self.unit, self._smallest = undamped.unit or 1.0, undamped._smallest
-        with balanced(self.M, self.C, self.K, self.unit) as d:
-            matrices, more = (self.M, self.C, self.K), min(2 * count, count + MORE)
-            start = shapes / d[:, None]
-            values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit)
+        matrices, d = balanced(self.M, self.C, self.K, self.unit)
+        start, more = shapes / d[:, None], min(2 * count, count + MORE)
+        values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit)
         vectors = d[:, None] * right, d[:, None] * left
         return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
 
@@ -402,8 +401,8 @@ class Pencil(Sendable):
             with suppress(ComputationError):  # where round-off is too large for it, or K is singular
                 return self._by_blocks(count)
         self.factor = None
-        with balanced(M, C, K, unit, self.unknowns) as d:
-            values, right, errors = self._nearest(M, C, K, count, target / unit)
+        matrices, d = balanced(M, C, K, unit, self.unknowns)
+        values, right, errors = self._nearest(*matrices, count, target / unit)
         return (self.unit or 1.0) * values, d[:, None] * right, errors
 
     def _by_blocks(self, count: int) -> tuple[Array, Array, Array]:
@@ -419,7 +418,7 @@ class Pencil(Sendable):
         return out
 
     def _nearest(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
-        """Return (λ, x, backward error) nearest to the target, of balanced matrices."""
+        """Return (λ, x, backward error) nearest to the target, of balanced matrices, which may change."""
         n = K.getSize()[0]
         wanted = min(2 * count + 2, 2 * n - 2)
         if self.comm.size == 1 and basis_of(wanted, n) == 2 * n:
@@ -430,16 +429,16 @@ class Pencil(Sendable):
         if symmetric:
             K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         use_direct_solver(st.getKSP(), n, symmetric, self.pivots)
-        started, scaled = perf_counter(), 1.0
+        started = perf_counter()
         try:
             pep.setUp()
             self.factored += perf_counter() - started
             if self.unit is None and target == 0.0:
                 # P(0) = K is factorised in any unit of time, so the inertia of its factor costs nothing more.
                 lowest = least_frequency(M, K, st.getKSP())
-                self.unit = scaled = float(power_of_two(2 * count * lowest)) if lowest > 0.0 else 1.0
-                C.scale(scaled)
-                M.scale(scaled**2)
+                self.unit = float(power_of_two(2 * count * lowest)) if lowest > 0.0 else 1.0
+                C.scale(self.unit)
+                M.scale(self.unit**2)
             pep.solve()
             return self._found(pep, K, count, wanted)
         except ComputationError:
@@ -447,8 +446,6 @@ class Pencil(Sendable):
         except Exception as error:
             raise ComputationError(f"the eigensolver failed: {error}", advice="a slightly different speed") from None
         finally:
-            C.scale(1 / scaled)
-            M.scale(1 / scaled**2)
             pep.destroy()
 
     @staticmethod

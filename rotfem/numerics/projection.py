@@ -206,6 +206,10 @@ class PlusLowRank:
         """Return two PETSc vectors that fit."""
         return tuple(self.sparse.createVecs())
 
+    def copy(self) -> PlusLowRank:
+        """Return one with a sparse part of its own."""
+        return PlusLowRank(self.sparse.copy(), self.part, self.factor)
+
     def times(self, X: Array) -> Array:
         """Return (S + c B Bᵀ) X of columns of owned rows (n, m)."""
         return times(self.sparse, X) + self.added(X)

@@ -109,7 +109,7 @@ class PointValues:
         self.dofs, self.weights = local[own, None] * size + np.arange(size), weights[own]
 
     def __call__(self, values: Array) -> Array:
-        """Return the (block size,) values at the point from a local dof array of the space."""
+        """Return the values (block size,) at the point of a local dof array of the space, or of its owned part."""
         return np.asarray(summed(self._comm, self.weights @ values[self.dofs]))
 
     def columns(self, length: int) -> Array:
