@@ -18,6 +18,12 @@ sys.dont_write_bytecode = False
 gc.set_threshold(100_000)  # expressions of UFL are many small objects in use, and looked at for nothing
 
 
+def pytest_collection_finish() -> None:
+    """Take what the imports left out of all collections to come: a study of cost collects before each measurement."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     asked = "nightly" in str(config.option.markexpr) or any("::" in str(argument) for argument in config.args)
     if asked:

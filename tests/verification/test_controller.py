@@ -11,6 +11,8 @@ import rotfem
 
 L, HUB = 10.0, 50.0
 SECTION = {"EA": 1e8, "GA": 1e8, "EI": 1e7, "mass_per_length": 1.2}
+#: Steps at a jump resolve the waves along the beam: these are three times slower, and their steps as much longer.
+SLOWER = SECTION | {"EA": 1e7, "GA": 1e7}
 INERTIA = HUB + 1.2 * L**3 / 3
 
 
@@ -54,7 +56,7 @@ def test_momentum_is_the_impulse_of_what_the_tip_asks_for() -> None:
 def relay(below: float, above: float, wanted: float) -> Any:
     """Return the scene of a hub whose torque jumps at a speed (rad/s), from one value (N·m) to another."""
     return {
-        "structure": {"type": "planar_beam", "length": L, "section": SECTION},
+        "structure": {"type": "planar_beam", "length": L, "section": SLOWER},
         "motion": {
             "type": "torque",
             "hub_inertia": HUB,
@@ -70,7 +72,7 @@ def test_a_relay_that_holds_the_hub_at_its_jump_has_no_steps() -> None:
     """I Ω̇ = ±M at Ω₀ holds Ω = Ω₀ (Filippov): what steps would follow is said, and when."""
     M, wanted = 400.0, 0.5
     with pytest.raises(rotfem.ComputationError, match="sliding mode") as failure:
-        rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "tolerance": 1e-3}})
+        rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "tolerance": 1e-2}})
     assert failure.value.time == pytest.approx(wanted * INERTIA / M, rel=0.05)
     with pytest.raises(rotfem.ComputationError, match="the torque jumps there"):
         rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "step": 0.05}})

@@ -152,8 +152,9 @@ def test_power_of_the_actuator() -> None:
         {"harmonic": {"amplitude": amplitude, "frequency": omega}},
         "reissner",
         motion={"type": "table", "table": [[0, spin], [2, spin], [3, 5.0]]},
-        loads={"gravity": [0, 0, -1e-9], "distributed": {"value": [0, 0, 1e-9]}},
+        loads={"gravity": [1e-9, 1e-9, -1e-9], "distributed": {"value": [1e-9, 1e-9, 1e-9]}},
         time={"end": 1.0, "step": 5e-3, "scheme": "generalised_alpha", "spectral_radius": 0.8},
+        initial={"state": "undeformed"},
     ).history
     t, e = found["t"], np.array([np.cos(precone), 0.0, np.sin(precone)])
     force, moment = (np.column_stack([found[name] for name in names]) for names in (ROOT[:3], ROOT[3:]))
