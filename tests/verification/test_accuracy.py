@@ -60,7 +60,9 @@ def asked(name: str, accuracy: float) -> RunResult:
 
 
 @pytest.mark.parametrize(
-    ("name", "accuracy"), [*((name, accuracy) for name in SCENES for accuracy in (1e-2, 1e-3)), ("spin-up", 1e-4)]
+    ("name", "accuracy"),
+    [*((name, 1e-3) for name in SCENES), ("spin-up", 1e-2), ("small", 1e-2), ("spin-up", 1e-4)]
+    + [pytest.param(name, 1e-2, marks=pytest.mark.nightly) for name in ("pulse", "free hub")],
 )
 def test_the_truth_is_as_near_as_was_asked(name: str, accuracy: float) -> None:
     result = asked(name, accuracy)

@@ -123,7 +123,7 @@ def test_energy_stays_in_space(structure: str, theory: str) -> None:
     assert not halved(result)
 
 
-@pytest.mark.parametrize("theory", NONLINEAR)
+@pytest.mark.parametrize("theory", ["second_order", "reissner"])
 def test_work_of_a_follower_is_all_that_is_given(theory: str) -> None:
     """A force that turns with the section has no potential; H changes by its work.
 
@@ -147,7 +147,7 @@ def test_work_of_a_follower_is_all_that_is_given(theory: str) -> None:
     assert change == pytest.approx(work, abs=2e-3 * np.ptp(work))
 
 
-@pytest.mark.parametrize("theory", NONLINEAR)
+@pytest.mark.parametrize("theory", ["second_order", "reissner"])
 def test_damping_only_takes(theory: str) -> None:
     """Every single step loses energy, by the viscous work in its middle."""
     result = run(released(theory, 300, **{"structure.damping.kelvin_voigt": 1e-3}))

@@ -85,7 +85,7 @@ def state_of(system: Any, t: float) -> Any:
     return np.concatenate([residual, y.array])
 
 
-@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
     """Residual and tangent at a random state are those of the model compiled without it, to rounding."""
     full = Problem.of(scene(ALL, {"model.theory": theory}))
@@ -346,7 +346,8 @@ def test_an_explanation_takes_the_loads_of_a_run(loads: dict[str, Any]) -> None:
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
     """A torque M for T seconds on I_R + ρ L³/3 about the axis."""
     motion = {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.0, 2.0, 300.0], [2.0, 3.0, -600.0]]}
-    scene = Scene.from_dict({"structure": STRUCTURE, "motion": motion, "time": {"end": 4.0, "step": 0.02}})
+    tables = {"structure": STRUCTURE, "mesh": {"elements": 2}, "modes": {"count": 2}}
+    scene = Scene.from_dict({**tables, "motion": motion, "time": {"end": 4.0, "step": 0.04}})
     rigid = 1.2 * 10.0**3 / 3 + 6e-4 * 10.0  # with that of the sections
     assert rotfem.explain(scene).summary["speeds"] == pytest.approx([300.0 * 2.0 / (100.0 + rigid)], rel=2e-3)
 
@@ -372,7 +373,7 @@ def test_change_by_damping_is_the_damping_ratio() -> None:
     assert rows["damping"]["estimate"][MODES] == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
 
 
-@pytest.mark.parametrize("bending", [2.0e4, 3.0e4])
+@pytest.mark.parametrize("bending", [2.0e4, pytest.param(3.0e4, marks=pytest.mark.nightly)])
 def test_change_by_damping_that_long_steps_hide(bending: float) -> None:
     """Steps damp and delay the undamped vibration of a beam in gusts more than the damped one."""
     section = {"EA": 2.2e8, "GA": 7.0e7, "EI": bending, "mass_per_length": 8.0, "rotary_inertia": 9e-4}
@@ -553,8 +554,8 @@ def test_modes_and_campbell_choose_too() -> None:
         assert found[-1] == pytest.approx(branch["frequency"][-1], rel=1e-3)
 
 
-@pytest.mark.parametrize("motion", [{"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 2.0}])
-def test_a_blow_of_four_milliseconds_does_not_cost_the_tolerance(motion: dict[str, Any]) -> None:
+def test_a_blow_of_four_milliseconds_does_not_cost_the_tolerance() -> None:
+    motion = {"type": "constant", "speed": 2.0}
     blow = [[0, 0, 0], [1.501, 0, 0], [1.503, 0, 4000.0], [1.505, 0, 0], [9.0, 0, 0]]
     changes = {"loads": {"tip_force": blow}, "motion": motion, "time": {"end": 2.0, "step": 0.001, "output_every": 10}}
     full = rotfem.run(scene(SPIN_UP, changes | {"output.error": False}))

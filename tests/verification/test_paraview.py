@@ -96,7 +96,8 @@ def test_modes_of_a_beam_have_width_and_turn(tmp_path: Path) -> None:
 def test_a_mode_of_a_beam_is_animated(tmp_path: Path) -> None:
     from PIL import Image
 
-    paths = animate(rotfem.modes(BLADE), 2, tmp_path)
+    result = rotfem.modes(BLADE)
+    paths = animate(result, 2, tmp_path)
     assert [path.name for path in paths] == ["mode_2.png", "mode_2.gif"]
     with Image.open(paths[1]) as gif:
         assert getattr(gif, "n_frames", 1) == FRAMES
@@ -104,7 +105,7 @@ def test_a_mode_of_a_beam_is_animated(tmp_path: Path) -> None:
         gif.seek(FRAMES // 2)
         assert np.mean(np.abs(np.asarray(gif.convert("L"), dtype=float) - first) > 20.0) > 0.01, "it moves"
     with pytest.raises(rotfem.SceneError, match="must be a mode from 1 to 5"):
-        animate(rotfem.modes(BLADE), 6, tmp_path)
+        animate(result, 6, tmp_path)
 
 
 def test_plates_write_xdmf_too(tmp_path: Path) -> None:

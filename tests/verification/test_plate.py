@@ -209,7 +209,7 @@ def strip(**changes: Any) -> Scene:
     ],
 )
 def test_strip_is_a_beam(spin_up: Any, theory: str, history: float, frequency: float) -> None:
-    time = {"end": 7.0, "step": 0.01, "output_every": 10}
+    time = {"end": 7.0, "step": 0.02, "output_every": 5}
     beam = rotfem.run(spin_up({"model.theory": theory}, time=time)).history
     plate = rotfem.run(strip(model__theory=theory, time=time)).history
     scale = float(np.max(np.abs(beam["tip_u2"])))

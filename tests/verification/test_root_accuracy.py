@@ -41,7 +41,7 @@ def test_the_truth_is_as_near_as_was_asked(scene: dict[str, Any], accuracy: floa
 def test_rows_between_steps_of_a_thin_plate_are_as_good_as_is_said() -> None:
     """A pulse of pressure in some ten steps: the error by the steps, at the rows, is not under by more than two.
 
-    Against radau5 with a tolerance of 1e-5 on the same mesh. Rows whose shear strain is interpolated are off by 3 %.
+    Against radau5 with a tolerance of 1e-4 on the same mesh. Rows whose shear strain is interpolated are off by 3 %.
     """
     tables = {
         "structure": {"type": "plate", "length": 0.8, "width": 0.4, "thickness": 0.008}
@@ -53,7 +53,7 @@ def test_rows_between_steps_of_a_thin_plate_are_as_good_as_is_said() -> None:
     }
     time = {"end": 0.2, "output_step": 0.004, "scheme": "esdirk4", "tolerance": 1e-2}
     result = rotfem.run({**tables, "time": time})
-    exact = rotfem.run({**tables, "time": {**time, "scheme": "radau5", "tolerance": 1e-5}, "output": {"error": False}})
+    exact = rotfem.run({**tables, "time": {**time, "scheme": "radau5", "tolerance": 1e-4}, "output": {"error": False}})
     here, there = (np.column_stack([run.history[f"root_m{i}"] for i in (1, 2, 3)]) for run in (result, exact))
     off = np.linalg.norm(here - there, axis=1).max() / np.linalg.norm(there, axis=1).max()
     assert result.summary["error"]["time"] > off / 2

@@ -38,8 +38,13 @@ SCHEMES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("scheme", list(SCHEMES))
-@pytest.mark.parametrize("data", list(DATA))
+#: All data by one scheme, and one of the clamp and one of the hub by all.
+KINKS = [(data, "rho 0.8") for data in DATA] + [
+    (data, s) for data in ("speeds", "torque") for s in ("rho 0", "newmark")
+]
+
+
+@pytest.mark.parametrize(("data", "scheme"), KINKS)
 def test_second_order_after_kinks(unit_beam: Any, data: str, scheme: str) -> None:
     """A quarter of the step, a sixteenth of the change, more or less, as the knots lie elsewhere in their steps.
 
@@ -126,7 +131,7 @@ def test_every_pulse_gives_its_impulse(step: float) -> None:
     assert history["impulse"][-1] == pytest.approx(50.0 * len(ends), rel=1e-10)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.1, 0.3, 0.6, 0.8, 0.9, 1.0])
+@pytest.mark.parametrize("rho", [0.0, 0.3, 0.8, 1.0])
 def test_short_ramps_give_their_impulse(rho: float) -> None:
     """Up and down within a step, or over several: H = ∫ M dt for every ρ∞.
 
