@@ -275,7 +275,8 @@ def check_profile_length(key: str, profile: Profile, length: float, slack: float
     if not math.isclose(places[-1], length, rel_tol=slack):
         reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {places[-1]:.9g}"
         raise problem(key, [list(row) for row in profile], reason)
-    closest, x = min(((after - before, after) for before, after in pairwise(places)), default=(length, length))
+    apart = ((after - before, after) for before, after in pairwise(places) if after > before)  # equal is a kink
+    closest, x = min(apart, default=(length, length))
     if closest <= ONE * length:
         least = f"more than {ONE * length:.2g} m, 1e-7 of the length"
         raise problem(key, x, f"is {closest:.2g} m beyond the row before; rows of a jump must be apart by {least}")
