@@ -209,8 +209,7 @@ class Pieces:
         self._free.array[clamped] = 0.0
         self.assembled = 0.0
         self.analysed: DirectSolver | None = None
-        loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
-        self.constants: dict[str, Any] = {**model.frame.constants, **loads}
+        self.constants: dict[str, Any] = {**model.frame.constants, **self.structure.load_constants}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
         self.at_rest, self._forms = model.derived_forms("pieces", self._made)
         symbols = self.structure.section | self.structure.scalars | model.switches

@@ -255,7 +255,7 @@ class System(Solutions, ABC):
         self.model.frame.set(values)
         if self.structure.load_constants:
             for name, value in self.load_values(t, motion).items():
-                self.structure.load_constants[name][0].value[...] = load_factor * value
+                self.structure.load_constants[name].value[...] = load_factor * value
             self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
 
     def show_time(self, t: float) -> None:
@@ -267,8 +267,8 @@ class System(Solutions, ABC):
         """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""
         turn = motion.rotation(t) if self.model.fixed else None
         values = {}
-        for name, (amplitude, at) in self.structure.load_constants.items():
-            value = np.atleast_1d(np.asarray(at(t), dtype=float))
+        for name, amplitude in self.structure.load_constants.items():
+            value = np.atleast_1d(np.asarray(amplitude.at(t), dtype=float))
             values[name] = value if turn is None or not amplitude.dead else amplitude.turned(value, turn)
         return values
 
@@ -299,8 +299,7 @@ class System(Solutions, ABC):
 
         To be asked for before effects are switched.
         """
-        loads = [constant for constant, _ in self.structure.load_constants.values()]
-        constants = [*self.model.frame.constants.values(), *loads]
+        constants = [*self.model.frame.constants.values(), *self.structure.load_constants.values()]
         kept = [c.value.copy() for c in constants], [x.copy() for x in self._state]
         for constant in constants:
             constant.value[...] = 0.0

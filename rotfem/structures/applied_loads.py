@@ -24,6 +24,10 @@ Array = npt.NDArray[np.float64]
 class Amplitude:
     """The components of a uniform vector: a constant of the forms.
 
+    Args:
+        constant: of the forms.
+        at: time (s) ↦ amplitudes.
+
     Attributes:
         follows_nodes: whether the amplitudes are values at the nodes of the mesh.
         dead: whether it keeps its direction in the frame of the hub.
@@ -34,9 +38,10 @@ class Amplitude:
     follows_nodes: bool = False
     dead: bool = True
 
-    def __init__(self, constant: fem.Constant):
+    def __init__(self, constant: fem.Constant, at: Callable[[float], Array]):
         self.vector: Any = constant
         self.value: Array = constant.value
+        self.at = at
 
     def turned(self, value: Array, turn: Array) -> Array:
         """Return the amplitudes of the turned vector (3, 3); one alone is about the axis of the turn."""
@@ -54,12 +59,12 @@ class SpanField(Amplitude):
         function: the field, blocked by the components.
         basis: s_k, (k, local dofs); None where the amplitudes are the values at all nodes.
         places: number of each local node among all of these, then.
-        size: number of amplitudes.
+        at: time (s) ↦ amplitudes.
     """
 
-    def __init__(self, function: fem.Function, basis: Array | None, places: npt.NDArray[np.int64] | None, size: int):
-        self._function, self._basis, self._places = function, basis, places
-        self.follows_nodes, self.value = basis is None, np.zeros(size)
+    def __init__(self, function: fem.Function, basis: Array | None, places: Any, at: Callable[[float], Array]):
+        self._function, self._basis, self._places, self.at = function, basis, places, at
+        self.follows_nodes, self.value = basis is None, np.zeros_like(at(0.0))
         self.vector = function if function.ufl_shape else ufl.as_vector([function])
 
     @classmethod
@@ -81,11 +86,11 @@ class SpanField(Amplitude):
                 values[~there] = 0.0
             parts.append(np.moveaxis(values, 1, 0).reshape(values.shape[1], -1))
         basis = np.concatenate(parts)
-        return cls(f, basis, None, len(basis))
+        return cls(f, basis, None, load.at)
 
     @classmethod
-    def of_place(cls, structure: Any, load: PlaceLoad, n: int) -> tuple[SpanField, Callable[[float], Array]]:
-        """Return the field through the nodes of the structure, and time (s) ↦ its amplitudes.
+    def of_place(cls, structure: Any, load: PlaceLoad, n: int) -> SpanField:
+        """Return the field through the nodes of the structure.
 
         That of a function which does not change is evaluated once, and has the single amplitude 1.
         """
@@ -99,10 +104,10 @@ class SpanField(Amplitude):
             return np.ravel(first(load.on(places, t).reshape(len(places), -1), n))
 
         if load.constant:
-            field = cls(f, amplitudes(0.0).reshape(-1, n)[nodes].reshape(1, -1), None, 1)
+            field = cls(f, amplitudes(0.0).reshape(-1, n)[nodes].reshape(1, -1), None, lambda t: np.ones(1))
             field.follows_nodes = True
-            return field, lambda t: np.ones(1)
-        return cls(f, None, nodes, len(places) * n), amplitudes
+            return field
+        return cls(f, None, nodes, amplitudes)
 
     def turned(self, value: Array, turn: Array) -> Array:
         """Return the amplitudes as they are: the field is turned in `update`."""

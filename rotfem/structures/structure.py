@@ -132,7 +132,7 @@ class Structure:
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
         points: where loads or masses are at a point.
-        load_constants: name of a load ↦ its amplitude, and what this is at time t (s).
+        load_constants: name of a load ↦ its amplitude in the forms.
     """
 
     type: ClassVar[str]
@@ -177,7 +177,7 @@ class Structure:
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
         self.scalars: dict[str, fem.Constant] = {}
-        self.load_constants: dict[str, tuple[Amplitude, Callable[[float], Array]]] = {}
+        self.load_constants: dict[str, Amplitude] = {}
         #: What finite rotations are counted from; None where they have no limit, or the theory none of large size.
         self.turns: Turns | None = None
 
@@ -379,20 +379,19 @@ class Structure:
     def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
         """Return a load in the forms, its first `size` components, and remember its amplitude."""
         made: Amplitude
-        at: Callable[[float], Array] = load.at
         if isinstance(load, PlaceLoad):
-            made, at = SpanField.of_place(self, load, size)
+            made = SpanField.of_place(self, load, size)
         elif load.is_uniform:
-            made, at = Amplitude(self.constant(np.zeros(size))), lambda t: first(load.at(t), size)
+            made = Amplitude(self.constant(np.zeros(size)), lambda t: first(load.at(t), size))
         else:
             made = SpanField.of_shapes(self, load, size)
         made.dead = load.kind == "dead"
-        self.load_constants[name] = (made, at)
+        self.load_constants[name] = made
         return made.vector
 
     def update_loads(self, turn: Array | None = None) -> None:
         """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead loads."""
-        for amplitude, _ in self.load_constants.values():
+        for amplitude in self.load_constants.values():
             amplitude.update(turn if amplitude.dead else None)
 
     # --- damping ------------------------------------------------------------------------------------------------

@@ -99,11 +99,11 @@ class Excitation:
     def loads(self, t: Array) -> dict[str, Array]:
         """Return the values of the constants of loads at times (n,), by name, (n, size)."""
         values = {}
-        for name, (constant, at) in self.system.structure.load_constants.items():
-            if constant.follows_nodes:
-                values[name] = np.array([at(float(s)) for s in t])
+        for name, amplitude in self.system.structure.load_constants.items():
+            if amplitude.follows_nodes:
+                values[name] = np.array([amplitude.at(float(s)) for s in t])
             else:
-                values[name] = self._signal(f"loads.{name}", at, t)[:, : constant.value.size]
+                values[name] = self._signal(f"loads.{name}", amplitude.at, t)[:, : amplitude.value.size]
         return values
 
     def _moved(self, t: Array, angle: Array, speed: Array, rate: Array) -> dict[str, Array]:
@@ -217,7 +217,7 @@ class FreeHubEquations(HeldEquations):
         """Read n and n_q of every component of a constant, in the order of `_entries`."""
         system, row, V = self.model.system, self.bordered.row, self.model.V[self.model.owned]
         constants = {name: c for name, c in system.model.frame.constants.items() if name not in ("w", "dw")}
-        constants |= {name: c for name, (c, _) in system.structure.load_constants.items()}
+        constants |= system.structure.load_constants
         everything = [*system.model.frame.constants.values(), *constants.values()]
         kept = [c.value.copy() for c in everything]
         for c in everything:
