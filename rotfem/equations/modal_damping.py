@@ -131,11 +131,11 @@ class ByMode(LowRank):
         B: M φ_j √(2 ζ_j ω_j), owned rows, a column each.
         shapes: φ_j √(2 ζ_j ω_j) likewise.
         omega: ω_j, rad/s.
-        like: see `LowRank`.
+        comm: see `LowRank`.
     """
 
-    def __init__(self, B: Array, shapes: Array, omega: Array, like: Any):
-        super().__init__(B, like)
+    def __init__(self, B: Array, shapes: Array, omega: Array, comm: MPI.Comm):
+        super().__init__(B, comm)
         self.shapes, self.omega = shapes, omega
 
     def displaced(self, v: Array) -> Array:
@@ -159,7 +159,9 @@ def damping_by_mode(system: Any) -> ByMode | None:
     modes, zeta = damped_modes(system, ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
-    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], system.A)
+    return ByMode(
+        modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], system.comm
+    )
 
 
 def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:

@@ -60,6 +60,8 @@ def times(A: Any, X: Array) -> Array:
 
 def times_transposed(A: Any, X: Array) -> Array:
     """Return Aᵀ X of a matrix and columns (n, m)."""
+    if isinstance(A, PlusLowRank):
+        return times_transposed(A.sparse, X) + A.added(X)
     y, x = A.createVecs()
     out: Array = np.zeros((y.getLocalSize(), X.shape[1]))
     for product, column in zip(out.T, X.T, strict=True):
@@ -136,19 +138,15 @@ class Sendable:
 
 
 class LowRank(Sendable):
-    """B Bᵀ; to those who multiply by it, it looks like a PETSc matrix.
-
-    Args:
-        B: owned rows, shape (n, m).
-        like: a PETSc matrix whose rows are shared out as those of B are.
+    """B Bᵀ.
 
     Attributes:
-        B: its columns.
+        B: owned rows, shape (n, m).
+        comm: communicator that its rows are distributed over.
     """
 
-    def __init__(self, B: Array, like: Any):
-        self.B, self._like = B, like
-        self.comm: MPI.Comm = like.comm.tompi4py()
+    def __init__(self, B: Array, comm: MPI.Comm):
+        self.B, self.comm = B, comm
 
     def along(self, X: Array) -> Array:
         """Return BᵀX of columns or a vector of owned rows, over all ranks."""
@@ -157,14 +155,6 @@ class LowRank(Sendable):
     def times(self, X: Array) -> Array:
         """Return B BᵀX of columns or a vector of owned rows."""
         return self.B @ self.along(X)
-
-    def mult(self, x: Any, y: Any) -> None:
-        """Write the product with a PETSc vector into another one."""
-        y.array[:] = self.times(x.array)
-
-    def createVecs(self) -> tuple[Any, Any]:
-        """Return two PETSc vectors that fit."""
-        return tuple(self._like.createVecs())
 
     def norm(self) -> float:
         """Return the Frobenius norm."""
@@ -177,16 +167,16 @@ class LowRank(Sendable):
 
     def scaled(self, rows: Array) -> LowRank:
         """Return D B Bᵀ D with the owned part of a diagonal D."""
-        return LowRank(rows[:, None] * self.B, self._like)
+        return LowRank(rows[:, None] * self.B, self.comm)
 
     def bordered(self) -> LowRank:
         """Return it with one unknown more, the last on the last rank, that it has no part in."""
         more = int(self.comm.rank == self.comm.size - 1)
-        return LowRank(np.vstack([self.B, np.zeros((more, self.B.shape[1]))]), self._like)
+        return LowRank(np.vstack([self.B, np.zeros((more, self.B.shape[1]))]), self.comm)
 
 
 class PlusLowRank:
-    """S + c B Bᵀ of a sparse S; to those who multiply, scale or solve (`DirectSolver`), it looks like a PETSc matrix.
+    """S + c B Bᵀ of a sparse S; it can be scaled, and `times` and `DirectSolver` take it, as a PETSc matrix.
 
     Args:
         sparse: S, a PETSc matrix.
@@ -196,15 +186,6 @@ class PlusLowRank:
 
     def __init__(self, sparse: Any, part: LowRank, factor: float = 1.0):
         self.sparse, self.part, self.factor = sparse, part, factor
-
-    @property
-    def comm(self) -> Any:
-        """The communicator that its rows are distributed over."""
-        return self.sparse.comm
-
-    def createVecs(self) -> tuple[Any, Any]:
-        """Return two PETSc vectors that fit."""
-        return tuple(self.sparse.createVecs())
 
     def copy(self) -> PlusLowRank:
         """Return one with a sparse part of its own."""
@@ -218,20 +199,9 @@ class PlusLowRank:
         """Return c B Bᵀ X of columns or a vector of owned rows."""
         return np.asarray(self.factor * self.part.times(X))
 
-    def mult(self, x: Any, y: Any) -> None:
-        """Write the product with a PETSc vector into another one."""
-        self.sparse.mult(x, y)
-        y.array[:] += self.added(x.array)
-
-    def multTranspose(self, x: Any, y: Any) -> None:
-        """Write the product of the transpose with a PETSc vector into another one."""
-        self.sparse.multTranspose(x, y)
-        y.array[:] += self.added(x.array)
-
-    def norm(self, kind: Any = None) -> float:
-        """Return a bound of a norm, Frobenius or the PETSc kind INFINITY: that of S and that of the rest."""
-        rest = self.part.norm() if kind is None else self.part.bound()
-        return float(self.sparse.norm(kind) + abs(self.factor) * rest)
+    def norm(self, kind: Any) -> float:
+        """Return a bound of the norm of the PETSc kind INFINITY: that of S and that of the rest."""
+        return float(self.sparse.norm(kind) + abs(self.factor) * self.part.bound())
 
     def scale(self, factor: float) -> None:
         """Multiply it by a number."""
