@@ -98,7 +98,7 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     the trace of the product of both projections by the smaller dimension.
     """
     ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
-    la, lb = a.pairs.values, b.pairs.values
+    la, lb = a.nonzero, b.nonzero
     if conjugate:
         yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
     here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
@@ -126,7 +126,9 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
         values: the eigenvalues, 1/s.
         bounds: their relative error bounds; what is no farther apart than these, or REPEATED, is one.
     """
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(REPEATED, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
+    sizes = np.abs(values)
+    off = bounds * sizes
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(REPEATED * sizes[1:], off[1:] + off[:-1])
     out = [[0]] if len(values) else []
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])
@@ -300,12 +302,17 @@ class Sweep:
     @staticmethod
     def _gap(point: SpeedPoint, b: int, k: int | None) -> float:
         """Return how far a branch is above the line kΩ at a point, or without k above zero, rad/s."""
-        return point.signed(b) if k is None else point.value(b).imag - k * abs(point.speed)
+        zero = point.order[b] >= 0 and point.spinning.pairs.bounds[point.order[b]] >= 1.0
+        omega = 0.0 if zero else point.signed(b)
+        return omega if k is None else abs(omega) - k * abs(point.speed)
 
     def _between(self, left: SpeedPoint, right: SpeedPoint, b: int, k: int | None) -> bool:
-        """Return whether a branch has the frequency kΩ, or passes zero without k, between two points."""
-        ends = [self._gap(point, b, k) for point in (left, right)]
-        return bool(np.all(np.isfinite(ends)) and ends[0] != 0.0 and ends[0] * ends[1] <= 0.0)
+        """Return whether a branch has the frequency kΩ, or passes zero without k, between two points.
+
+        What has no frequency at rest is on all lines there.
+        """
+        one, other = (self._gap(point, b, k) for point in (left, right))
+        return one * other < 0.0 or (abs(one) > 0.0 and other == 0.0 and right.speed != 0.0)
 
     def _meeting(self, place: tuple[int, int, int | None]) -> tuple[float | None, int]:
         """Return the speed after the point i where a branch b has the frequency kΩ, or None, and solutions it took."""

@@ -153,9 +153,16 @@ class Spinning:
     described: Described | None = None
 
     @cached_property
+    def nonzero(self) -> Array:
+        """λ of the pairs; of those that are zero to round-off i times the least that is not, for a norm."""
+        lam = self.pairs.resolved
+        least = np.min(np.abs(lam[lam != 0.0]), initial=np.max(np.abs(lam), initial=1.0))
+        return np.where(lam == 0.0, 1j * least, lam)
+
+    @cached_property
     def own(self) -> Array:
-        """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs."""
-        return self.pencil.gram(self.pairs.left, self.pairs.values, self.pairs.right, self.pairs.values)
+        """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs, with the `nonzero` λ."""
+        return self.pencil.gram(self.pairs.left, self.nonzero, self.pairs.right, self.nonzero)
 
     def modal_basis(self, count: int) -> Spinning:
         """Return it with the pairs that motions are sums of: of its first modes those that are not zero to round-off.

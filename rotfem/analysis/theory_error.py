@@ -279,7 +279,7 @@ class Farthest:
 
     def conditioning(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that is unknown."""
-        return self._there(self.system.held, partial(conditioning, self.system.held))
+        return self._there(self.system.held, partial(conditioning, self.system.held, time=self.seen[1] or np.inf))
 
     def _there(self, system: Any, of_state: Callable[[Array], T]) -> T | None:
         """Return a function of the state, with its time set; None where nothing was seen, or it fails."""
@@ -297,7 +297,7 @@ class Farthest:
             system.set_state(*state)
 
 
-def conditioning(system: Any, q: Array) -> float:
+def conditioning(system: Any, q: Array, time: float = np.inf) -> float:
     """Return a bound of the relative error that round-off of K makes in a state of a linear theory; 0 of others.
 
     K is summed once, and what rounding did to it stays: the work of its forces on a displacement q is in error by up to
@@ -307,11 +307,12 @@ def conditioning(system: Any, q: Array) -> float:
     Args:
         system: equations of motion of the structure, hub held, with the time of the state set.
         q: the state, a local dof array.
+        time: since the motion began (s), in which masses keep the error small; infinite of an equilibrium.
     """
     if not system.linear:
         return 0.0
     system.set_state(q)
-    return rounded_compliance(system, system.matrix(1.0, 0.0, 0.0, 1.0), q)
+    return rounded_compliance(system, system.matrix(1.0, 0.0, 2.0 / time**2, 1.0), q)
 
 
 def rounded_compliance(system: Any, K: Any, q: Array) -> float:

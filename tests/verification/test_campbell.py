@@ -140,6 +140,16 @@ def test_branches_are_the_modes_of_their_speed(unit_beam: Any) -> None:
     assert all(row["residual"] < 1e-8 for row in result.rows)
 
 
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_a_hinge_that_nothing_holds_is_one_branch(spin_up: Any, theory: str) -> None:
+    """On the axis its frequency is zero at any speed, to round-off: no reason to solve others than those asked for."""
+    loose = {"structure.root": {"lag_stiffness": 0.0}, "model.theory": theory, "modes.count": 3}
+    result = campbell(spin_up(loose, mesh={"elements": 3}), [-4.0, -2.0, 0.0, 2.0, 4.0])
+    assert result.summary["speeds_solved"] == 5
+    assert result.summary["ambiguous"] == []
+    assert all(row["label"] != "lag 1" for row in result.summary["critical_speeds"])
+
+
 def test_lost_and_ambiguous_branches_are_said_to_be(unit_beam: Any) -> None:
     """consistent_linear beyond N0 = GA_s, the end of the theory: short waves come in at once and push branches out."""
     result = campbell(scene(unit_beam, "consistent_linear", 30, 0.0), "0:40:9", orders=0)
