@@ -26,7 +26,7 @@ class Load(Signal):
             function.
         function: Python function t (s) ↦ components, or None.
         kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
-        harmonic: what varies harmonically, added to the rest; it may be all there is.
+        harmonic: harmonic terms, added to the rest, or alone.
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")

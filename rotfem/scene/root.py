@@ -28,7 +28,7 @@ class PitchAngle(Given):
         value: a constant angle (rad), or None.
         table: rows (t, angle) in s and rad, at rest before the first and after the last; or None.
         function: Python function t (s) ↦ angle (rad), or None.
-        rate: Python function t (s) ↦ rate of the function's angle (rad/s), or None: differences, whose step follows it.
+        rate: Python function t (s) ↦ rate of the function's angle (rad/s), or None for differences.
         harmonic: added to these.
     """
 
@@ -108,7 +108,7 @@ class SpatialRoot(Root):
         pitch_stiffness: against turns about the axis of the blade (N·m/rad), or None: rigid.
         pitch_damping: against their rate (N·m·s/rad).
         pitch: angle that the whole blade is turned by about its axis at the root (rad), a number or over time.
-        driven: whether the drive of a shaft holds it along and about its axis alone; `supports` hold the rest.
+        driven: whether the drive constrains a shaft along and about its axis alone; `supports` carry the rest.
     """
 
     AXES: ClassVar[dict[str, int]] = {"pitch": 1, "flap": 2, "lag": 3}

@@ -75,10 +75,10 @@ class Scene(SceneModel):
         output: what to compute in addition to what is always recorded.
         limits: how much may be asked for.
         extensions: Python files that register what the scene names.
-        accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,
-            mesh, scheme and step follow from it.
-        accuracy_of: what it is the accuracy of; if not given, what a command computes first of all.
-        accuracy_budget: CPU time (s) that it may take, without a limit if not given.
+        accuracy: wanted error, relative to the largest displacement of the tip, or to each frequency; theory, mesh,
+            scheme and step follow from it.
+        accuracy_of: its output; by default that of the command, the tip or the frequencies.
+        accuracy_budget: limit of the CPU time (s) of all answers together; none by default.
     """
 
     structure: Structure = Field(description="a table [structure]")

@@ -275,7 +275,7 @@ class SpatialSection(Section):
         shear_center: position (y, z) in the section (m), or a table of them.
         tension_center: position (y, z) in the section (m), or a table of them.
         polar_radius: radius of gyration of the axial stiffness about the shear center, (∫Er² dA/∫E dA)^½ (m); if not
-            given, that of EA, EI2, EI3 and the centers. Only the effect `trapeze` has to do with it.
+            given, from EA, EI2, EI3 and the centers. It is for the effect `trapeze`.
         principal_angle: angle (rad) about axis 1 from the section axes to those that GA2, GA3, EI2, EI3 and the rotary
             inertias belong to; the centers do not turn with it.
         stiffness: full 6×6 stiffness matrix, or a table of them.

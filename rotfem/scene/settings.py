@@ -64,14 +64,14 @@ class Model(SceneModel):
         theory: name of a registered theory, the order of the strain measure.
         effects: "auto", or names of registered effects, those to include.
         frame: frame to which displacements refer.
-        prestress: of the prestressed linear theories of beams, what their geometric stiffness is of: "axial" forces, or
-            "all" forces and moments; None for what is usual for the structure.
-        tolerance: estimated error of the theory up to which a poorer one may take its place, or None.
-        on_exceed: what happens where the named theory misses the tolerance, too: "stop" ends with the failure that it
-            is, "warn" and "upgrade" (a richer one is tried before in any case) warn.
-        reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
-        foreshortening: whether a reduced model gives back the foreshortening that linear strains lack.
-        all_unknowns: whether unknowns that are zero by symmetry are unknowns of a history all the same.
+        prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
+            "all" forces and moments; None for "all" of spatial beams without hinges, else "axial".
+        tolerance: largest estimated error of a cheaper theory that is used instead, or None.
+        on_exceed: if the named theory misses the tolerance, too, "stop" ends with exit status 3; "upgrade" and "warn"
+            warn.
+        reduced: whether a history of a linear theory is computed by a reduced model; a number is its accuracy.
+        foreshortening: whether a reduced model includes foreshortening.
+        all_unknowns: whether a history keeps unknowns that are zero by symmetry.
     """
 
     theory: Annotated[str, PlainValidator(lambda value: as_name(value, registry.theories))] = "reissner"
@@ -105,9 +105,9 @@ class Initial(SceneModel):
 
     Attributes:
         tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or None.
-        state: "steady", the equilibrium under the speed, loads and pitch of t = 0, or "undeformed"; a static shape
-            (`tip_displacement`) is no equilibrium of theirs.
-        mode: number of a mode about that state which the motion starts in, or None.
+        state: "steady", the equilibrium under the speed, loads and pitch of t = 0, or "undeformed"; with
+            `tip_displacement` neither.
+        mode: number of a mode about that state that is added, or None.
         amplitude: largest displacement of the tip in it (m).
         phase: of the mode (rad): at 0 the tip is displaced, at π/2 it moves.
         velocity: rows (x, v1, v2, v3) of a beam's axis relative to the turning frame (m, m/s), or None.
@@ -167,7 +167,7 @@ class PlateMesh(SceneModel):
     """The [mesh] table of a plate.
 
     Attributes:
-        elements: (nx, ny) of a rectangle; if not given, 64 cells by its aspect ratio (see `suited`). Without meaning if
+        elements: (nx, ny) of a rectangle; by default 64 cells by its aspect ratio (see `suited`). Without meaning if
             the structure has a mesh file.
         degree: polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
         cell: cell shape of a rectangle; without meaning if the structure has a mesh file.
@@ -253,10 +253,10 @@ class Time(WithParameters):
         max_step: longest adaptive step (s); `end`/20 if not given.
         min_step: shortest adaptive step (s); 1e-9 `end` if not given.
         scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
-        breakpoints: times (s) at which a function of time jumps or has a kink. Steps of order above 2 end there, others
-            see the straight line of the same impulse and first moment.
+        breakpoints: times (s) at which a function of time jumps or has a kink. Steps of order above 2 end there; others
+            replace it by the straight line of the same impulse and first moment.
         output_every: number of steps from one output to the next.
-        output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
+        output_step: time (s) from one output to the next, independent of the steps; None for `output_every`.
     """
 
     CHOICE, ENTRIES = "scheme", registry.schemes
@@ -320,9 +320,9 @@ class Modes(SceneModel):
 
     Attributes:
         count: number of modes.
-        about: state about which the motion is small: "steady" (deformed equilibrium) or "undeformed".
-        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds. If not given up to 4Ω,
-            as many as meet a mode.
+        about: state of the linearisation: "steady" (deformed equilibrium) or "undeformed".
+        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds. By default those up to 4Ω
+            that meet a mode.
         rated: rated speed of the rotor, which the diagram marks (rad/s).
         operating: lowest and highest speed of operation, which the diagram marks (rad/s).
     """
@@ -382,14 +382,13 @@ class OutputTable(SceneModel):
     """The [output] table.
 
     Attributes:
-        quantities: names of registered outputs, to be computed in addition to what is always recorded; and of what
-            beams have at their stations, all of it if none is named.
+        quantities: registered outputs to record, and quantities at the stations of a beam, by default all of these.
         stations: positions along a beam (m) where section forces, strains and unknowns are recorded; a number of them
             from end to end.
         every: rows of history.csv from one record of the stations to the next.
-        format: of the file that they go to.
-        fields: format of the files for ParaView, "xdmf"; none where it is empty.
-        error: whether the error of what is computed is estimated.
+        format: of the file of the stations.
+        fields: format of the files for ParaView, "xdmf"; empty for none.
+        error: whether errors are estimated.
         speed: unit in which speeds are printed and drawn; that of motion.speed if not given.
         frequency: unit in which frequencies of modes are printed and drawn.
     """
