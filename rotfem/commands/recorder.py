@@ -331,13 +331,16 @@ def reduced_history(
         ComputationError: it failed.
     """
     accuracy = accuracy_of(scene)
-    response = reduced_response(system, times_of(scene.time), start, accuracy, scene.model.foreshortening)
-    error = max(response.basis_error, response.time_error)
-    if error > accuracy:
-        what = f"the reduced model of {response.model.size} vectors is in error by {error:.2g}"
+    try:
+        response = reduced_response(system, times_of(scene.time), start, accuracy, scene.model.foreshortening)
+        error = max(response.basis_error, response.time_error)
+        if error > accuracy:
+            what = f"the reduced model of {response.model.size} vectors is in error by {error:.2g}"
+            raise ComputationError(f"{what}, more than {accuracy:.2g}")
+    except ComputationError as failure:
         if alone:  # a full system of this theory costs as much as one of a richer theory
-            raise ComputationError(what)
-        log.warnings.append(f"{what}, more than model.reduced allows ({accuracy:.2g}); the full system was used")
+            raise
+        log.warnings.append(f"{failure}; the full system was used")
         return None
     log.steps = response.solution.steps
     monitor.critical = critical_speed_within(system, response.model.V[response.model.owned])

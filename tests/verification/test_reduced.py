@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import ComputationError, SceneError, explain, run
-from rotfem.analysis.reduced import response
+from rotfem.analysis.reduced import response, solution
 from rotfem.analysis.reduced.solution import Solution, cut, functions
 from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
@@ -250,9 +250,12 @@ def test_a_reduced_model_needs_a_linear_theory(spin_up: MakeScene) -> None:
             spin_up({"model.theory": "linear", "model.reduced": wrong})
 
 
-def test_the_basis_is_checked(spin_up: MakeScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A basis that may not grow is seen to be too small, and the full system is used and said."""
-    monkeypatch.setattr(response, "MOST_COLUMNS", 1)
+@pytest.mark.parametrize("limit", [("MOST_COLUMNS", 1), ("ITERATIONS", 1)])
+def test_a_model_that_does_not_serve_is_said(
+    spin_up: MakeScene, monkeypatch: pytest.MonkeyPatch, limit: tuple[str, int]
+) -> None:
+    """A basis that may not grow is seen to be too small, or no motion is found: the full system is used and said."""
+    monkeypatch.setattr(response if limit[0] == "MOST_COLUMNS" else solution, *limit)
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True}
     scene = spin_up(changes, time={"end": 1.0, "step": 0.02}, mesh={"elements": 4}, loads={"tip_force": GUST})
     result = run(scene)

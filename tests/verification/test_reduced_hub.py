@@ -62,6 +62,20 @@ def test_momentum_is_the_impulse_given() -> None:
     assert np.abs(gained - history["impulse"]).max() < 1e-6 * np.abs(gained).max()
 
 
+def test_a_last_window_of_one_short_step() -> None:
+    """The knot of the torque leaves one step of 1.2 ms; momentum and impulse stay alike to the projection."""
+    section = {"EA": 1e6, "GA2": 4e5, "GA3": 3e5, "GJ": 100.0, "EI2": 200.0, "EI3": 400.0, "mass_per_length": 2.0}
+    inertia = {"rotary_inertia2": 1e-3, "rotary_inertia3": 2e-3}
+    blade = {"type": "spatial_beam", "length": 1.0, "hub_radius": 0.2, "section": section | inertia, "precone": 0.1}
+    blade |= {"pretwist": [[0.0, 0.3], [1.0, 0.0]], "tip_mass": 0.2, "tip_offset": [0.02, 0.03, 0.01]}
+    hub = {"type": "torque", "hub_inertia": 0.5, "table": [[0.0, 1.0], [0.1, 3.0], [0.3, -1.0]], "speed": 4.0}
+    tables = {"structure": blade, "motion": hub, "mesh": {"elements": 2, "degree": 2}, "time": {"end": 0.3, "step": 0.1}}
+    found = run({**tables, "model": {"theory": "consistent_linear", "reduced": 1e-6}, **ALONE})
+    assert not any("full system" in line for line in found.warnings)
+    momentum = found.history["angular_momentum"] - found.history["impulse"]
+    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("factor", [1.0, 4.0])
 def test_what_is_given_as_error_is_not_under_the_true_one_by_two(factor: float) -> None:
     """Of a free hub, with its foreshortening or without, at two sizes of the torque."""
