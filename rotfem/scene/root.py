@@ -28,7 +28,7 @@ class PitchAngle(Given):
         value: a constant angle (rad), or None.
         table: rows (t, angle) in s and rad, at rest before the first and after the last; or None.
         function: Python function t (s) ↦ angle (rad), or None.
-        rate: Python function t (s) ↦ rate of the function's angle (rad/s), or None for differences.
+        rate: Python function t (s) ↦ rate of the function's angle (rad/s); by default differences.
         harmonic: added to these.
     """
 

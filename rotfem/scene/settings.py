@@ -65,7 +65,7 @@ class Model(SceneModel):
         effects: "auto", or names of registered effects, those to include.
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
-            "all" forces and moments; None for "all" of spatial beams without hinges, else "axial".
+            "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".
         tolerance: largest estimated error of a cheaper theory that is used instead, or None.
         on_exceed: if the named theory misses the tolerance, too, "stop" ends with exit status 3; "upgrade" and "warn"
             warn.
@@ -256,7 +256,7 @@ class Time(WithParameters):
         breakpoints: times (s) at which a function of time jumps or has a kink. Steps of order above 2 end there; others
             replace it by the straight line of the same impulse and first moment.
         output_every: number of steps from one output to the next.
-        output_step: time (s) from one output to the next, independent of the steps; None for `output_every`.
+        output_step: time (s) from one output to the next, independent of the steps; by default `output_every` steps.
     """
 
     CHOICE, ENTRIES = "scheme", registry.schemes
