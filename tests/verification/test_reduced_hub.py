@@ -69,8 +69,9 @@ def test_a_last_window_of_one_short_step() -> None:
     blade = {"type": "spatial_beam", "length": 1.0, "hub_radius": 0.2, "section": section | inertia, "precone": 0.1}
     blade |= {"pretwist": [[0.0, 0.3], [1.0, 0.0]], "tip_mass": 0.2, "tip_offset": [0.02, 0.03, 0.01]}
     hub = {"type": "torque", "hub_inertia": 0.5, "table": [[0.0, 1.0], [0.1, 3.0], [0.3, -1.0]], "speed": 4.0}
-    tables = {"structure": blade, "motion": hub, "mesh": {"elements": 2, "degree": 2}, "time": {"end": 0.3, "step": 0.1}}
-    found = run({**tables, "model": {"theory": "consistent_linear", "reduced": 1e-6}, **ALONE})
+    tables = {"structure": blade, "motion": hub, "mesh": {"elements": 2, "degree": 2}, **ALONE}
+    time, model = {"end": 0.3, "step": 0.1}, {"theory": "consistent_linear", "reduced": 1e-6}
+    found = run({**tables, "time": time, "model": model})
     assert not any("full system" in line for line in found.warnings)
     momentum = found.history["angular_momentum"] - found.history["impulse"]
     np.testing.assert_allclose(momentum, momentum[0], rtol=1e-6)
