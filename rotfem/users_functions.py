@@ -66,7 +66,7 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
         if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
             value = value[2:]
         if value.size != size:
-            raise _refused(key, of, arguments, f"must return {needed}, not {value.size}")
+            raise _refused(key, of, arguments, f"must return {needed}, not {value.size} of them")
         if not all(map(math.isfinite, value)):
             raise _refused(key, of, arguments, f"returned {value}; must return finite numbers")
         if planar and size == 3 and value[2] != 0.0:

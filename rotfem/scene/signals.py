@@ -74,7 +74,9 @@ class Kind:
         names = ", ".join(over)
         if callable(value):
             if arguments(value) != len(over):
-                raise problem("", value, f"must be a function f({names}); it takes {arguments(value)} arguments")
+                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
+                needed = f"f({names.replace('x', places)})"
+                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
             function: Callable[..., Any] = value
             return function
         shape = "a table " + " or ".join(f"[[{names}, {columns}], …]" for columns in self.columns)

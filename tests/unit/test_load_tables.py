@@ -122,3 +122,10 @@ def test_what_changes_with_time_is_said_where_there_is_one_time_only() -> None:
     done = rotfem.run(scene({"tip_force": {"over_time": [[0, 0, 1], [1, 0, 2]]}}, model={"theory": "linear"}))
     assert any("loads.tip_force changes with time" in line for line in done.summary["warnings"])
     assert done.tip["u2"][-1] == pytest.approx(1e3 / (3 * 1e3) + 10 / 1e6, rel=1e-9)  # F = 1: L³/3EI + L/GA
+
+
+def test_a_place_of_a_plate_is_one_argument() -> None:
+    plate = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    tables = {"structure": plate, "motion": STILL, "loads": {"pressure": {"over_span": lambda x, y: y}}}
+    with pytest.raises(SceneError, match=r"f\(\(x, y\)\); it takes 2 arguments"):
+        Scene.from_dict(tables)
