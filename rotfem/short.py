@@ -14,6 +14,11 @@ LONGEST, LONGEST_VALUE = 400, 64
 class _Short(reprlib.Repr):
     """Repr of values in which arrays are their shapes and functions their names."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxtuple, self.maxlist, self.maxdict = 3, 4, 4, 4
+        self.maxstring = self.maxother = LONGEST_VALUE
+
     def repr_ndarray(self, array: Any, level: int) -> str:
         """Return the shape of an array of more than a few numbers."""
         return f"array{array.shape}" if array.size > self.maxlist else repr(array).replace("\n", "")
@@ -28,8 +33,6 @@ class _Short(reprlib.Repr):
 
 
 _SHORT = _Short()
-_SHORT.maxlevel, _SHORT.maxtuple, _SHORT.maxlist, _SHORT.maxdict = 3, 4, 4, 4
-_SHORT.maxstring = _SHORT.maxother = LONGEST_VALUE
 
 
 def short(name: str, values: dict[str, Any]) -> str:

@@ -36,9 +36,6 @@ from rotfem.version import versions
 
 Tree = dict[str, Any]
 
-#: Seconds after which ranks tell each other of signals: mpirun gives its processes a quarter of a second.
-TALK = 0.05
-
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observers", "_linearised", "_about")
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 APART = {
@@ -373,7 +370,8 @@ class RunStore:
     def _agreed(self) -> tuple[bool, bool]:
         """Return whether a signal has come to one of the ranks, and whether a checkpoint is due, the same on all.
 
-        Ranks talk to each other after so many steps only as take about `TALK` on rank 0: they need not meet in between.
+        Ranks talk to each other after so many steps only as take about 50 ms on rank 0, as mpirun gives its processes a
+        quarter of a second to end: they need not meet in between.
         """
         asked, every = self._interrupts.asked, self.every
         steps = 0 if self._run is None else self._run.log.steps
@@ -386,7 +384,7 @@ class RunStore:
             pace, self._talked = (now - self._talked[0]) / max(1, steps - self._talked[1]), (now, steps)
             told = self.comm.allgather((asked, late, pace))
             asked, (_, late, pace) = any(rank[0] for rank in told), told[0]
-            self._next = steps + max(1, int(TALK / max(pace, 1e-9)))
+            self._next = steps + max(1, int(0.05 / max(pace, 1e-9)))
         return asked, due or late
 
     def _left(self, state: State) -> float:

@@ -27,9 +27,6 @@ Array = npt.NDArray[np.float64]
 #: Ratio of cell sizes from which on two meshes are compared: that of three cells to two, half of the least odd number.
 LONGER = 1.5 * (1 - 1e-9)
 
-#: Part of the length within which two vertices are on one line.
-SAME = 1e-9
-
 
 @dataclass(frozen=True)
 class OtherMesh:
@@ -100,7 +97,7 @@ def lines(system: Any) -> list[Array]:
     mesh, out = system.structure.mesh, list[Array]()
     for axis in range(mesh.topology.dim):
         x = np.unique(np.concatenate(system.comm.allgather(np.unique(mesh.geometry.x[:, axis]))))
-        out.append(x[np.append(True, np.diff(x) > SAME * np.ptp(x))])
+        out.append(x[np.append(True, np.diff(x) > 1e-9 * np.ptp(x))])  # nearer ones are on one line
     return out
 
 

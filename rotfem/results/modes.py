@@ -21,7 +21,7 @@ from rotfem.results.result import Array, Rows, Variables, column_of_rows, nodes_
 from rotfem.results.surfaces import Surface
 
 #: Powers of ξ in a mode polynomial.
-POWERS = (2, 3, 4, 5, 6)
+POWERS = range(2, 7)
 
 #: Direction ↦ (displacement, rotation that is its slope and the sign of it) of a spatial and of a planar beam.
 DIRECTIONS: dict[str, tuple[tuple[str, str, float], ...]] = {

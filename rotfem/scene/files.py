@@ -175,10 +175,6 @@ def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -
     return set_keys(file, data, [parse_override(file, override) for override in overrides])
 
 
-#: Characters of a cell that a message shows. A file may be anything that can be read here, and so a secret.
-SHOWN_CELL = 12
-
-
 def existing_file(value: Any, info: ValidationInfo) -> Path:
     """Return the absolute path of a file named in the scene, from its directory, which the context of `info` holds."""
     if not isinstance(value, str | Path) or not str(value):
@@ -282,8 +278,8 @@ def _cells(line: str) -> list[str]:
 
 
 def shown_cell(cell: str) -> str:
-    """Return a cell as a message shows it."""
-    return f'"{cell}"' if len(cell) <= SHOWN_CELL and cell.isprintable() else f"a text of {len(cell)} characters"
+    """Return a cell as a message shows it: a file may be anything that can be read here, and so a secret."""
+    return f'"{cell}"' if len(cell) <= 12 and cell.isprintable() else f"a text of {len(cell)} characters"
 
 
 def number_in(cell: str) -> float | None:
