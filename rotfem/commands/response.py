@@ -40,7 +40,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult
 from rotfem.scene import Scene, as_scene
-from rotfem.units import quantity
+from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
 
@@ -146,7 +146,7 @@ def frequencies_of(
     first = angular(low, "--from", 0.5 * float(np.min(swinging[swinging > 0.0], initial=last)) if free else 0.0)
     if free and first == 0.0:
         raise SceneError("command line", "--from", low, "must be above 0 of a free hub or a hinge that nothing holds")
-    if not 0.0 <= first < last or number < 2:
+    if not 0.0 <= first < last < np.inf or number < 2:
         reason = "frequencies must increase from at least 0 (rad/s, or with a unit), and their number be at least 2"
         raise SceneError("command line", "--from, --to, --number", [first, last, number], reason)
     grid = np.concatenate([np.linspace(first, last, number), lines])
@@ -210,15 +210,10 @@ def angular(value: float | str | None, option: str, default: float) -> float:
     if value is None:
         return default
     try:
-        found = float(value)
-    except ValueError:
-        try:
-            found = quantity(str(value), "rad/s")
-        except ValueError as error:
-            raise SceneError("command line", option, value, str(error)) from None
-    if not np.isfinite(found):
-        raise SceneError("command line", option, value, "must be a finite frequency")
-    return found
+        number, unit = split_unit(str(value))
+        return float(number) * unit
+    except ValueError as error:
+        raise SceneError("command line", option, value, str(error)) from None
 
 
 def result_of(
