@@ -5,7 +5,8 @@ contribution of steps or mesh and s the allowed one, the next answer has
 
     tolerance' = tolerance · s/e,    n' = n (e/s)^{1/(k + 1)},
 
-n the number of elements of degree k. A model whose own error is too large is replaced by the next richer one. The loop
+n the number of elements of degree k. After an error of 100 % and more s is the bound of the asymptotic range, if that is
+larger: no order says how far a finer answer is. A model whose own error is too large is replaced by the next richer one. The loop
 ends with the first answer whose error is within the accuracy, if nothing is left to refine, if a finer setting gives
 the same answer (steps are no more exact than the increments of Newton's method), or if the next answer would exceed
 the budget. Its time is predicted from the last one.
@@ -23,6 +24,7 @@ from mpi4py import MPI
 
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
+from rotfem.refinement.estimate import ASYMPTOTIC
 
 R = TypeVar("R")
 
@@ -150,11 +152,11 @@ class Setting:
             return None
         known, of_steps = contribution(error, "time"), SAFETY * each
         if self.tolerance is not None and (error.get("time", 0.0) is None or known > of_steps):
-            less = AIM * of_steps / known if known > 0.0 else AIM**2
+            less = aimed_at(known, of_steps) / known if known > 0.0 else AIM**2
             new = replace(new, tolerance=self.tolerance * max(less, MOST_GROWTH**-4))
         if (space := contribution(error, "space")) > each or error.get("space", 0.0) is None:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
-            growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
+            growth = (space / aimed_at(space, each)) ** (1 / order) if space > 0.0 else 2.0
             if self.elements is not None:
                 new = replace(new, elements=grown(self.elements, min(max(growth, 1.25), MOST_GROWTH)))
             elif self.degree < HIGHEST:
@@ -196,6 +198,14 @@ class Setting:
 def contribution(error: Mapping[str, Any], name: str) -> float:
     """Return a contribution to an error; 0 if it is unknown or missing."""
     return float(error.get(name) or 0.0)
+
+
+def aimed_at(known: float, allowed: float) -> float:
+    """Return what a contribution is to be in the next answer: a part of what is allowed.
+
+    After an error of all of the output, which no order holds for, it is a part of the asymptotic range first.
+    """
+    return AIM * (allowed if known < 1.0 else max(allowed, ASYMPTOTIC))
 
 
 def is_known(error: Mapping[str, Any]) -> bool:

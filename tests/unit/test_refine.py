@@ -106,6 +106,10 @@ def test_the_largest_contribution_is_refined_by_its_order() -> None:
     far = SETTING.finer({"time": 1e9, "space": 1e9, "total": 2e9}, 1e-3)
     assert far is not None
     assert (far.elements, far.tolerance) == (8 * SETTING.elements, SETTING.tolerance / 8**4)
+    lost = SETTING.finer({"time": 2.5, "space": 1.4, "total": 3.9}, 1e-3)  # no digit: the asymptotic range comes first
+    assert lost is not None
+    assert lost.tolerance == pytest.approx(1e-2 * 0.5 * 0.05 / 2.5)
+    assert lost.elements == int(np.ceil(6 * (1.4 / 0.025) ** (1 / 4)))
     file, coarse = Setting((FULL,), None, 2, "esdirk4", 1e-2), {"time": 0.0, "space": 0.1, "total": 0.1}
     assert file.finer(coarse, 1e-3) == replace(file, degree=3)
     assert replace(file, degree=HIGHEST).finer(coarse, 1e-3) is None
