@@ -9,9 +9,9 @@ from __future__ import annotations
 import pytest
 
 from tests.pairs.covering import Row
-from tests.pairs.trying import RANKED, Trial, parameters, rows_of
+from tests.pairs.trying import RANKED, Trial, on_few_ranks, parameters, rows_of
 
-ROWS = list(rows_of(2, seed=1))
+ROWS = on_few_ranks(list(rows_of(2, seed=1)))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import pytest
 
 from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
-from tests.pairs.covering import Levels, Row, covering, missing
+from tests.pairs.covering import Levels, Row, covering, missing, sets_of
 from tests.pairs.refusals import REFUSALS, WHOLE
 from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, TOLERANCE, as_toml, forms_of, shuffled, tables_of
 
@@ -36,6 +36,16 @@ def name_of(row: Row) -> str:
 def rows_of(strength: int, seed: int, also: Sequence[Levels] = ALSO) -> Iterator[Row]:
     """Return rows with every set of so many choices that can occur together, and those of some factors."""
     return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed, also, forms_of))
+
+
+def on_few_ranks(rows: Sequence[Row]) -> list[Row]:
+    """Return rows with the same pairs, on one process those of which others have all pairs with two processes."""
+    out = list(rows)
+    pairs = [{pair for pair in sets_of(row, 2, ACTIVE, ()) if ("ranks", "2") in pair} for row in rows]
+    for i, own in enumerate(pairs):
+        if own <= {pair for other in pairs[:i] + pairs[i + 1 :] for pair in other}:
+            out[i], pairs[i] = {**rows[i], "ranks": "1"}, set()
+    return out
 
 
 #: Mark of tests on two processes.
