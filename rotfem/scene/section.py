@@ -152,8 +152,8 @@ class Section(SceneModel):
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
             for name, values in asdict(self._geometry(np.array(self.knots))).items():
-                if name not in ("centroid", "shear_center") and not np.all(np.greater(values, 0.0)):
-                    raise problem("shape", self.shape, f"gives {name} = {np.min(values):g}; must be above 0")
+                if name not in ("centroid", "shear_center") and not np.all(np.greater_equal(values, 0.0)):
+                    raise problem("shape", self.shape, f"gives {name} = {np.min(values):g}; must be positive")
 
 
 def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:

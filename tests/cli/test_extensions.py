@@ -288,4 +288,4 @@ def test_shape_with_a_negative_property(rotfem: Rotfem, folder: Path) -> None:
     done = rotfem("--load", "mine.py", "check", "beam.toml", "--set", section, "-o", "out")
     assert done.status == 2
     assert "structure.section.shape" in done.err
-    assert "second_moment2 = -0.1; must be above 0" in done.err
+    assert "second_moment2 = -0.1; must be positive" in done.err
