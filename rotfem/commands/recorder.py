@@ -300,7 +300,7 @@ class Recorder:
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()
-            if len(out.stations.t):  # a run may fail before its first record
+            if self.snapshots is not None and len(out.stations.t):  # a run may fail before its first record
                 out.further.append(stations_writer(self.system, out.stations))
         if self.snapshots is not None and self.snapshots.kept:
             more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)

@@ -40,6 +40,8 @@ def test_a_beam_and_its_section_forces(tmp_path: Path) -> None:
     assert result.stations is not None
     np.testing.assert_allclose(line["M"], result.stations["M"][-1])
     np.testing.assert_allclose(line["displacement"][-1, 1], result.history["tip_u2"][-1])
+    rotfem.run({**scene, "output": {"stations": 5, "fields": [], "error": False}}, folder=tmp_path)
+    assert not list(tmp_path.glob("*.xdmf"))
 
 
 def test_a_line_in_space_is_where_it_is(tmp_path: Path) -> None:
