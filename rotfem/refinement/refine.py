@@ -5,11 +5,11 @@ contribution of steps or mesh and s the allowed one, the next answer has
 
     tolerance' = tolerance · s/e,    n' = n (e/s)^{1/(k + 1)},
 
-n the number of elements of degree k. After an error of 100 % and more s is the bound of the asymptotic range, if that is
-larger: no order says how far a finer answer is. A model whose own error is too large is replaced by the next richer one. The loop
-ends with the first answer whose error is within the accuracy, if nothing is left to refine, if a finer setting gives
-the same answer (steps are no more exact than the increments of Newton's method), or if the next answer would exceed
-the budget. Its time is predicted from the last one.
+n the number of elements of degree k. After an error of 100 % and more, s is at least the bound of the asymptotic range:
+no order says how far a finer answer is. A model whose own error is too large is replaced by the next richer one. The
+loop ends with the first answer whose error is within the accuracy, if nothing is left to refine, if a finer setting
+gives the same answer (steps are no more exact than the increments of Newton's method), or if the next answer would
+exceed the budget. Its time is predicted from the last one.
 """
 
 from __future__ import annotations
