@@ -158,6 +158,8 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
     center = result.summary["center_of_mass"]
     axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
     dress(axis, f"{i + 1} (m)", f"{j + 1} (m)")
+    if (i, j) == (1, 2):  # the angles of sections are what they are
+        axis.set_aspect("equal", adjustable="datalim")
 
 
 # --- explanations -----------------------------------------------------------------------------------------------------

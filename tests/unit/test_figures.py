@@ -312,7 +312,9 @@ def test_properties_of_a_blade() -> None:
     columns |= {f"t{k}_{i}": np.full(13, float(k == i)) for k in (2, 3) for i in (1, 2, 3)}
     center = [20.0, 0.0, 2.0]
     result = CheckResult(said(mass=1e4, length=60.0, root=[0.0] * 3, center_of_mass=center), columns, {"x": x}, None)
-    check(result.plot())
+    figure = result.plot()
+    check(figure)
+    assert figure.axes[2].get_aspect() == 1.0, "sections seen along the axis are turned by their angles"
 
 
 def test_what_effects_change() -> None:
