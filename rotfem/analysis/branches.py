@@ -48,10 +48,6 @@ Array = npt.NDArray[Any]
 SURE, AMBIGUOUS = 0.9, 0.5
 
 
-#: Relative distance of eigenvalues below which they are taken for one, as those of a disk at rest.
-REPEATED = 1e-6
-
-
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
 
@@ -124,11 +120,11 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
 
     Args:
         values: the eigenvalues, 1/s.
-        bounds: their relative error bounds; what is no farther apart than these, or REPEATED, is one.
+        bounds: their relative error bounds; what is no farther apart than these, or SAME, is one.
     """
     sizes = np.abs(values)
     off = bounds * sizes
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(REPEATED * sizes[1:], off[1:] + off[:-1])
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(SAME * sizes[1:], off[1:] + off[:-1])
     out = [[0]] if len(values) else []
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])

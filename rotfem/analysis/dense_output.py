@@ -20,12 +20,10 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import Array, State
+from rotfem.analysis.time_grid import CLOSE
 
 #: Part of the cubic's largest acceleration by which those of the states may differ from its own.
 KNOWN = 0.5
-
-#: Distance of two instants, as a part of the interval between rows, at which they are one.
-CLOSE = 1e-9
 
 
 class RowTimes:
