@@ -130,13 +130,16 @@ def critical(rows: list[dict[str, Any]], speed: float, fixed: bool) -> list[str]
 
 def doubtful(rows: list[dict[str, Any]]) -> list[str]:
     """Return warnings of frequencies that round-off may have changed by 0.01 %, or the mesh by 2 %, and more."""
-    lost = [(row["label"], min(row["error_bound"], 9.99)) for row in rows if row["error_bound"] > 1e-4]
+    lost = [(row["label"], row["error_bound"]) for row in rows if 1e-4 < row["error_bound"] < 1.0]
+    zero = ", ".join(row["label"] for row in rows if row["error_bound"] >= 1.0)
     off = [(row["label"], error) for row in rows if (error := row.get("mesh_error") or 0.0) > 0.02]
     unreliable = ", ".join(f"{label} by up to {100 * bound:.2g} %" for label, bound in lost)
     coarse = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in off)
     texts = {
         unreliable: f"unreliable: round-off may have changed {unreliable} (error_bound), as axial or shear stiffness "
         "outweighs what these modes feel; fewer elements, or stiffnesses that are lower but still without influence",
+        zero: f"unreliable: round-off leaves no digit of {zero}: nothing holds that motion, or axial or shear "
+        "stiffness outweighs what it feels",
         coarse: f"coarse: the mesh may have changed {coarse} (mesh_error); more mesh.elements, or a higher mesh.degree",
     }
     return [text for found, text in texts.items() if found]
