@@ -402,12 +402,12 @@ def refine(
         seconds = clock.used() - began
         answer = Answer(setting, error, seconds - clock.compiled(), result)
         found.tried.append({**setting.summary(), "error": error["total"], "seconds": seconds})
-        same = found.best is not None and is_known(error) and error == found.best.error
-        if found.best is None or answer.rank <= found.best.rank:
+        same, met = found.best is not None and error == found.best.error, is_within(error, accuracy)
+        if met or found.best is None or answer.rank <= found.best.rank:  # contributions do not weigh the same
             found.best = answer
-        if same and not is_within(error, accuracy):
+        if same and is_known(error) and not met:
             what = "a finer setting gave the same answer"
             found.failure = ComputationError(what, advice="a looser accuracy, or a smaller solver.increment_tolerance")
-        elif not is_within(error, accuracy):
+        elif not met:
             following = clock.comm.bcast(setting.finer(error, accuracy))
     return found

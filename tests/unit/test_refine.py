@@ -127,6 +127,14 @@ def test_the_first_that_meets_it_is_returned() -> None:
     assert [tried["error"] for tried in told["attempts"]] == [1.6e-2, 4e-4]
 
 
+def test_an_answer_that_meets_it_is_returned_though_another_has_a_smaller_error() -> None:
+    """The error by a theory is an estimate and counts twice; that by the steps is a bound."""
+    setting = replace(SETTING, models=(LINEAR, FULL))
+    asked, attempt = attempts(result(6e-4, time=0.0, model=6e-4), result(8e-4, time=8e-4))
+    assert to_accuracy(SCENE, setting, attempt, clock()).summary["accuracy"]["estimated"] == 8e-4
+    assert len(asked) == 2
+
+
 def test_a_failure_in_finer_steps_leaves_what_was_reached() -> None:
     """The same model had answered, so what fails in shorter steps is no motion that ends; the failure is said."""
     reached = result(2e-3)
