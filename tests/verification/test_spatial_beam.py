@@ -559,7 +559,7 @@ def test_base_acceleration_is_minus_gravity(theory: str) -> None:
         np.testing.assert_allclose(falling[name], still[name], rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_NIGHTLY])
 def test_section_given_as_matrices(theory: str) -> None:
     """Centres or full 6×6 matrices: the same section, the same frequencies."""
     by_centers = scene(TWISTED, {"model.theory": theory, "structure.section.mass_center": [0.03, 0.02]})
