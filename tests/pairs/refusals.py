@@ -64,7 +64,7 @@ REFUSALS = (
         {"structure": PLATES, "root": but("root", "clamped")},
         r"structure\.root",
         SCENE,
-        "`[structure.root]` is of beams.",
+        "A beam may have hinges and springs at its root.",
     ),
     Refusal(
         {"structure": ("planar",), "root": ("pitch",)},
@@ -100,13 +100,13 @@ REFUSALS = (
         {"frame": ("inertial",), "motion": FREE},
         r'model\.frame.*is not available with motion\.type = "torque"',
         SCENE,
-        "exact theory whose speed is prescribed",
+        "a planar beam with an exact theory and a prescribed speed",
     ),
     Refusal(
         {"frame": ("inertial",), "damping": ("modal",)},
         r"structure\.damping\.modal",
         SCENE,
-        'small motions. It needs `frame = "rotating"`',
+        'small motions, and needs `frame = "rotating"`',
     ),
     Refusal(
         {"root": ("pitch",), "motion": FREE},
@@ -130,26 +130,26 @@ REFUSALS = (
         {"command": ("run",), "time": ("steady",), "checkpoint": ("resumed",)},
         r"--(checkpoint|resume): needs a scene with \[time\]",
         "docs/results.md",
-        "Checkpoints are of histories: a steady state has no steps.",
+        "A steady state has no steps, so no checkpoints.",
     ),
     Refusal(
         {"command": ("run",), "time": ("steady",), "loads": ("gravity",), "motion": but("motion", "rest")},
         r"loads\.gravity.*gravity across the spin axis turns",
         "docs/theory.md",
-        "so a spinning beam under gravity has no steady state in the frame",
+        "So a spinning beam under gravity across the axis has no steady state in the frame",
     ),
     Refusal(
         {"command": ("response",), "loads": but("loads", "harmonic")},
         r"loads: a frequency response needs a harmonic load",
         SCENE,
-        "It needs a `harmonic` load",
+        "it needs a `harmonic` load",
     ),
     *(
         Refusal(
             {"root": ("hinge",), **choices},
             r"nothing holds the root's hinge \(lag\): no steady state at 0 rad/s",
             SCENE,
-            "a hinge without a spring at rest that a load turns",
+            "Without an equilibrium (a load on a free hinge at rest)",
         )
         for choices in AT_REST
     ),
