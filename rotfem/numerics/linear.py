@@ -208,7 +208,8 @@ class DirectSolver:
     def _columns(self, right: Array) -> Array:
         """Return the solutions with the factor alone."""
         out = np.empty_like(right, order="F")
-        self._ksp.getPC().getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
+        if right.shape[1]:  # MUMPS knows no solution for no column
+            self._ksp.getPC().getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
         return out
 
 

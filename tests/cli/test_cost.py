@@ -62,12 +62,12 @@ def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) 
 
 
 def test_what_the_budget_leaves_out_is_said(rotfem: Rotfem, folder: Path) -> None:
-    """Errors of 1e-9 take more steps than two seconds allow; what was reached is written."""
-    done = rotfem("cost", "beam.toml", "--quick", "--budget", "2s", "--accuracy", "1e-9", "--no-plots")
+    """Errors of 1e-9 take more steps than five seconds allow; what was reached is written."""
+    done = rotfem("cost", "beam.toml", "--quick", "--budget", "5s", "--accuracy", "1e-9", "--no-plots")
     assert done.status == 3
     summary = json.loads((folder / "results" / "beam" / "summary.json").read_text())
-    assert summary["budget"]["seconds"] == 2.0
-    assert summary["budget"]["used"] < 4.0
+    assert summary["budget"]["seconds"] == 5.0
+    assert summary["budget"]["used"] < 7.0
     assert summary["budget"]["refused"]
     assert summary["recommended"] is None
     assert "no setting is known to be within 1e-09 (relative)" in done.out

@@ -121,7 +121,8 @@ def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_jumps_denser_than_steps_act_by_their_mean(monkeypatch: pytest.MonkeyPatch) -> None:
     """A force that jumps 2000 times is its mean and a ripple at ω = 2000π/T, which moves less than its part of (ω₁/ω)².
 
-    Of 400 cells of the time grid each has five jumps, and one or two steps; what is left is the tolerance.
+    Of 400 cells of the time grid each has five jumps, and one or two steps but for the first ones; what is left is the
+    tolerance.
     """
     monkeypatch.setattr("rotfem.analysis.march.CELL", 1 / 400)
     end, found = 0.5, []
@@ -133,7 +134,7 @@ def test_jumps_denser_than_steps_act_by_their_mean(monkeypatch: pytest.MonkeyPat
         model, time = {"theory": "consistent_linear"}, {"end": end, "tolerance": 1e-3}
         found.append(run({**scene, "model": model, "time": time}))
     ripple, mean = (result.history for result in found)
-    assert found[0].summary["steps"] < 820
+    assert found[0].summary["steps"] < 1000
     off = np.interp(ripple["t"], mean["t"], mean["tip_u2"]) - ripple["tip_u2"]
     assert np.max(np.abs(off)) < 3e-3 * np.max(np.abs(mean["tip_u2"]))
 
