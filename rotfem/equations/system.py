@@ -231,7 +231,7 @@ class System(Solutions, ABC):
 
     def local(self, x: Array) -> Array:
         """Return the local dof array of an owned one."""
-        return with_ghosts(self.V, x)
+        return with_ghosts(self.V, x) if self.shared else x
 
     def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
         """Write local dof arrays into the functions q, v, a that the forms are evaluated at; zero where None."""

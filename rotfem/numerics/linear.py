@@ -103,7 +103,8 @@ class DirectSolver:
         self._whole, self.A, self.factorisations = A, sparse_part(A), 0
         self._update: Update | None = None
         A = self.A
-        self._ksp, self._x = PETSc.KSP().create(A.comm), A.createVecRight()
+        self._ksp, self._solution = PETSc.KSP().create(A.comm), np.zeros(A.getLocalSize()[1])
+        self._x = PETSc.Vec().createWithArray(self._solution, (len(self._solution), A.getSize()[1]), comm=A.comm)
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         size = A.getSize()[0]
@@ -191,7 +192,7 @@ class DirectSolver:
         self._ksp.solve(b, self._x)
         if self._ksp.getConvergedReason() < 0:
             raise ComputationError(SINGULAR)
-        x = np.array(self._x.array)
+        x = self._solution.copy()
         return x if self._update is None else self._update(x)
 
     def solve_all(self, right: Array) -> Array:
