@@ -14,14 +14,15 @@ from rotfem.analysis.theory_error import KNOWN, conditioning
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
-from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.linear import DirectSolver, negative_count
 from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.reference_rotation import BeyondReach
 
 Array = npt.NDArray[np.float64]
 
-#: A continuation that must cut its steps below this share of the whole has met a limit point.
-SMALLEST_SHARE = 1e-3
+#: Smallest step, as a part of the whole load; of a column that buckles with an imperfection of 3e-8 of its load, such a
+#: step is as long as the bend of its path.
+SMALLEST_SHARE = 1e-5
 
 
 def less(system: System) -> str:
@@ -52,11 +53,13 @@ class Raised:
         q: the equilibrium at full load, a local dof array.
         reference: what its rotations are counted from.
         sure: whether it is the one of the growing load; not, where Newton's method wandered to it.
+        critical: shares of the load at which the stiffness changes the number of its negative eigenvalues.
     """
 
     q: Array
     reference: Any
     sure: bool = True
+    critical: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -111,53 +114,67 @@ class LoadFactors:
 def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     """Return the equilibrium at full load, in one step or by halved ones.
 
-    Where there are several equilibria, a way that wanders may end at any of them. Then smaller steps are taken, whose
-    ways do not, and where the load cannot be raised by them, the first equilibrium that was found is returned.
+    Where there are several equilibria, a step may end at any of them. So a step is halved, too, where an increment of
+    Newton's method was beyond its tangent, or where the stiffness changes the number of its negative eigenvalues
+    (Sylvester): then it has passed a critical point, or left the path. What remains of that at the smallest step is a
+    bifurcation of the path itself. Where the load cannot be raised, the first equilibrium found at full load is
+    returned.
 
     Raises:
         ComputationError: none was found; says how far the load got.
     """
     q, done, share = growth.begin(system), 0.0, 1.0
-    reference = system.reference
+    reference, critical = system.reference, list[float]()
+    negative = 0 if growth.start is None else None  # of an undeformed structure
     other: Raised | None = None
     while done < 1.0:
-        target = min(1.0, done + share)
+        target, afresh, smallest = min(1.0, done + share), False, share < 2 * SMALLEST_SHARE
         try:
             new = balance(system, growth, target, q, newton)
             wandered = newton.wandered
+            now = negative_count(system.A, sure=True) or 0
             new = counted(system, growth, target, new, newton)
         except BeyondReach as error:
             turns = system.structure.turns
             failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
         except ComputationError as error:
-            failure, afresh = error.what, False
+            failure = error.what
         else:
-            if not wandered:
-                q, done, share, reference = new, target, 1.5 * share, system.reference
+            if system.size(system.structure.total(new)) <= newton.tolerance:
+                now = 0 if negative is None else negative  # nothing bends it, as a shaft that spins about its axis: one state at all speeds
+            crossed = negative is not None and now != negative
+            if not wandered and (not crossed or smallest):
+                critical += [target] if crossed else []
+                q, done, share, reference, negative = new, target, 2 * share, system.reference, now
                 continue
-            failure, afresh = "Newton's way was a long one", False
+            failure = "Newton's way was a long one"
             if other is None and target == 1.0:
                 other = Raised(new, system.reference, False)
         share /= 2
         if share < SMALLEST_SHARE:
             if other is not None:
                 return other
-            system.count_rotations_from(reference)
-            system.set_state(q)
-            stretch = system.model.stretches()[1]
-            if stretch >= 2.0:
-                failure = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
-            raise ComputationError(
-                f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; "
-                f"{failure}",
-                advice=less(system),
-            )
+            raise _ended(system, growth, q, done, failure, reference)
         system.count_rotations_from(reference)
         if afresh:
             q, _ = recounted(system, q)
             reference = system.reference
     system.structure.check_range(q)
-    return Raised(np.asarray(q), reference)
+    return Raised(np.asarray(q), reference, critical=tuple(critical))
+
+
+def _ended(
+    system: System, growth: LoadFactors, q: Array, done: float, failure: str, reference: Any
+) -> ComputationError:
+    """Return the error of a load that could be raised no further than to a share, with the equilibrium q there."""
+    system.count_rotations_from(reference)
+    system.set_state(q)
+    stretch = system.model.stretches()[1]
+    why = f"beyond it the structure may snap, or no equilibrium is near; {failure}"
+    if stretch >= 2.0:
+        why = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
+    what = f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; {why}"
+    return ComputationError(what, advice=less(system))
 
 
 def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
