@@ -13,6 +13,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.load_steps import (
+    REGULAR_SHARE,
     SMALLEST_SHARE,
     LoadFactors,
     balance,
@@ -108,13 +109,14 @@ def _grown(system: Any, growth: LoadFactors, newton: Newton, notes: list[str]) -
         ComputationError: none was found; says how far the load got.
     """
     found = raised(system, growth, newton)
-    if found.critical:
-        shares = ", ".join(f"{share:.6g}" for share in found.critical)
-        notes.append(f"the stiffness changes its number of negative eigenvalues at {shares} of the load: a bifurcation")
-    if not found.sure:
-        notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
+    if found.least < REGULAR_SHARE:
+        if _compliance_lost(system, growth):
+            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: steps of the load were cut for ever")
         system.count_rotations_from(found.reference)
-        return balance(system, growth, 1.0, found.q, newton)
+        growth.set(system, 1.0)
+        system.set_state(found.q)
+    if found.critical is not None:
+        notes.append(f"the stiffness gets a negative eigenvalue at {found.critical:.6g} of the load: a bifurcation")
     return found.q
 
 

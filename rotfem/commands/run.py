@@ -123,8 +123,7 @@ class Simulation:
         """Compute the equilibrium at the speed of t = 0."""
         system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
         log.warnings += frozen_inputs(self.problem)
-        past_limits = self.scene.solver.past_limits
-        self.shape = steady_state(system, speed, self.iteration, past_limits=past_limits, notes=log.warnings)
+        self.shape = steady_state(system, speed, self.iteration, notes=log.warnings)
         stability = self.monitor.stability = stability_of(system, self.shape, speed)
         self._recorded(State.at_rest(system, *system.start(self.shape)))
         critical = self.monitor.critical
