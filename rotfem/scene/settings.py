@@ -66,9 +66,6 @@ class Model(SceneModel):
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
             "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".
-        tolerance: largest estimated error of a cheaper theory that is used instead, or None.
-        on_exceed: if the named theory misses the tolerance, too, "stop" ends with exit status 3; "upgrade" and "warn"
-            warn.
         reduced: whether a history of a linear theory is computed by a reduced model; a number is its accuracy.
         foreshortening: whether a reduced model includes foreshortening.
         all_unknowns: whether a history keeps unknowns that are zero by symmetry.
@@ -78,17 +75,11 @@ class Model(SceneModel):
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     prestress: Literal["axial", "all"] | None = None
-    tolerance: Positive | None = None
-    on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
     reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False
     foreshortening: bool = False
     all_unknowns: bool = False
 
     def _check(self) -> None:
-        if self.tolerance is not None and self.frame == "inertial":
-            raise problem("tolerance", self.tolerance, 'needs frame = "rotating", as the cheaper theories do')
-        if self.tolerance is not None and self.reduced:
-            raise problem("reduced", self.reduced, "cannot be combined with tolerance, which chooses the model")
         if self.foreshortening and not self.reduced:
             raise problem(
                 "foreshortening", True, "needs reduced = true: it is given back to the shapes of a reduced model"
