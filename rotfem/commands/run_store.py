@@ -282,8 +282,6 @@ class RunStore:
         option = "--resume" if self.resume else "--checkpoint"
         if scene.time is None:
             raise SceneError("command line", option, None, "needs a scene with [time]; a steady state has no steps")
-        if scene.model.reduced:
-            raise SceneError("command line", option, None, "has no meaning with model.reduced, which takes no steps")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
         self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end

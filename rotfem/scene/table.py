@@ -53,13 +53,6 @@ def problems_at(key: str, value: Any, before: str = "") -> Iterator[None]:
         raise problem(key, value, f"{before}{error.message()}") from None
 
 
-#: Keys of earlier versions ↦ what takes their place.
-GONE = dict.fromkeys(
-    ("on_exceed", "tolerance"),
-    'it went with 0.9; "accuracy" chooses theory, mesh and steps, "rotfem explain" compares theories; ',
-)
-
-
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
     matches = difflib.get_close_matches(str(name), list(names), n=1)
@@ -217,7 +210,7 @@ class SceneModel(BaseModel, metaclass=InputErrors):
         data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
-                hint = GONE.get(str(key)) or did_you_mean(key, names)
+                hint = did_you_mean(key, names)
                 raise problem(str(key), None, f"unknown key; {hint}allowed: {', '.join(names)}")
         for name, field in cls.model_fields.items():
             if field.is_required() and name not in data:
