@@ -68,9 +68,6 @@ def _bends_only(problem: Problem) -> bool:
 
 def directions(problem: Problem) -> tuple[Array, Array]:
     """Return in which directions of the frame anything drives a problem at any time, True also where that is unknown.
-
-    Returns:
-        Those of forces and accelerations, and those of moments and of the axis of the spin, shape (3,) each.
     """
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
