@@ -243,9 +243,9 @@ def scale(pencil: Pencil, rest: Any, factors: Any, unit: float) -> None:
     first.array[n:] = 0.0
     rows.diagonalScale(None, first)
     indptr, indices, data = rows.getValuesCSR()
-    strains = np.zeros(len(indptr) - 1)
-    np.maximum.at(strains, np.repeat(np.arange(len(strains)), np.diff(indptr)), data)
-    strains = strains[n:]
+    largest = np.zeros(len(indptr) - 1)  # of each row
+    np.maximum.at(largest, np.repeat(np.arange(len(largest)), np.diff(indptr)), data)
+    strains = largest[n:]
     d.array[n:] = power_of_two(1.0 / np.where(strains > 0.0, strains, 1.0))
     pencil.unknowns, pencil.pivots, pencil.unit, pencil.factors = d, True, unit, factors
     pencil.sizes = np.zeros(d.getLocalSize())
