@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
-from scipy.optimize import brentq
 
 from rotfem.analysis.load_steps import (
     SMALLEST_SHARE,
@@ -425,6 +424,8 @@ class Tracer:
 
         ds/dl = t_s has a simple zero there, so that the load itself is accurate to the square.
         """
+        from scipy.optimize import brentq  # slow to load, and only paths beyond a limit point need it
+
         slopes = {0.0: point.t_s}
 
         def slope(distance: float) -> float:
