@@ -47,7 +47,7 @@ class RowTimes:
         self._next = int(np.searchsorted(times, start + self._close, side="right"))
         self._reached: list[State] = []
 
-    def __call__(self, old: State, new: State, leg: Any) -> None:
+    def __call__(self, old: State, new: State) -> None:
         """Find the rows in a step from an old to a new state."""
         end = int(np.searchsorted(self.times, new.t + self._close, side="right"))
         times = list(map(float, self.times[self._next : end]))

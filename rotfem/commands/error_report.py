@@ -44,7 +44,7 @@ class RunErrors:
         wanted: whether errors are to be estimated.
         monitor: what has seen its states.
         shape: the equilibrium, a local dof array; None of a history.
-        stepper: of a march; None of others.
+        march: of a history; None of others.
         start: returns what the history starts from in another system of the problem.
     """
 
@@ -54,7 +54,7 @@ class RunErrors:
     wanted: bool
     monitor: Monitor
     shape: Array | None
-    stepper: Any
+    march: Any
     start: Callable[[Any], Start]
 
     @property
@@ -175,13 +175,13 @@ class RunErrors:
         if steps + mesh <= NOTICED and self.theory is not None and self.theory.warning():
             return said
         cures = []
-        if steps >= NOTICED / 2 and self.stepper is not None:
+        if steps >= NOTICED / 2 and self.march is not None:
             assert time is not None
             factor = min(1.0, NOTICED / 2 / steps)
             if time.tolerance is not None:
                 cures.append(f"time.tolerance = {rounded_down(time.tolerance * factor)}")
             else:
-                step = time.step * factor ** (1 / self.stepper.scheme.order)
+                step = time.step * factor ** (1 / self.march.scheme.order)
                 cures.append(f"time.step = {rounded_down(step)} or shorter")
         if mesh >= NOTICED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
