@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rotfem.commands.interrupts import together
-from rotfem.errors import ComputationError, InputError, SceneError, Stopped
+from rotfem.errors import ComputationError, InputError, Stopped
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.refinement.estimate import WORDS
 from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
@@ -49,7 +49,7 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
             elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
         else:
             elements = -(-nodes // mesh.degree)
-    first = Setting(models_of(scene, moving=time is not None), elements, degree_of(scene))
+    first = Setting(({"theory": scene.model.theory},), elements, degree_of(scene))
     if time is None:
         return first
     assert scene.accuracy is not None
@@ -68,26 +68,6 @@ def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
     growth = min(1.0, 24 / degree / max(elements))
     x, y = (max(math.ceil(n * growth), min(n, 3)) for n in elements)
     return x, y
-
-
-def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
-    """Return the keys of [model] of the models that a scene may be computed with, from the cheapest on.
-
-    The theory that a scene names is the richest of them. A history of small motions is cheapest by a reduced linear
-    model; steady states and modes cost little by any theory, and moments at the root are those of the theory itself.
-    """
-    full = {"theory": scene.model.theory, "reduced": False, "foreshortening": False}
-    linear = linear_of(scene)
-    if not moving or scene.accuracy_of == ROOT_MOMENT or linear is None:
-        return (full,)
-    assert scene.accuracy is not None
-    reduced = scene.accuracy / (4 * SAFETY)
-    quick = {"theory": linear.name, "reduced": reduced, "foreshortening": bool(linear.prestress)}
-    try:
-        scene.replace({f"model.{key}": value for key, value in quick.items()})
-    except SceneError:  # no reduced model has a torque by a controller
-        return (full,)
-    return quick, full
 
 
 def linear_of(scene: Scene) -> Theory | None:

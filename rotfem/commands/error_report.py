@@ -12,12 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
-from rotfem.analysis.theory_error import RESOLVED, TheoryError, static_rotation
+from rotfem.analysis.theory_error import RESOLVED, TheoryError
 from rotfem.commands.first_state import Start
-from rotfem.commands.recorder import Monitor, accuracy_of
+from rotfem.commands.recorder import Monitor
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
@@ -46,7 +45,6 @@ class RunErrors:
         wanted: whether errors are to be estimated.
         monitor: what has seen its states.
         shape: the equilibrium, a local dof array; None of a history.
-        reduced: a reduced model's history; None of others.
         companions: of a march; None without them.
         stepper: of a march; None of others.
         start: returns what the history starts from in another system of the problem.
@@ -58,7 +56,6 @@ class RunErrors:
     wanted: bool
     monitor: Monitor
     shape: Array | None
-    reduced: Response | None
     companions: HistoryErrors | None
     stepper: Any
     start: Callable[[Any], Start]
@@ -88,17 +85,13 @@ class RunErrors:
         if self.companions is not None:
             contributions = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
-        elif self.reduced is not None or self.shape is not None:
-            time = 0.0 if self.reduced is None else self.reduced.time_error + self.reduced.basis_error
-            contributions = {"time": time, "space": self._of_mesh(OUTPUTS[of])}
+        elif self.shape is not None:
+            contributions = {"time": 0.0, "space": self._of_mesh(OUTPUTS[of])}
         return ErrorEstimate({**contributions, "model": None if self.theory is None else self.theory.estimate}, found)
 
     @cached_property
     def theory(self) -> TheoryError | None:
         """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
-        if self.reduced is not None and self.reduced.foreshortening is not None:
-            basis = "the foreshortening by bending that it neglects, computed afterwards, is that large"
-            return TheoryError(self.reduced.foreshortening, basis, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
         names = self.system.structure.components
@@ -161,26 +154,21 @@ class RunErrors:
                 return None
             apart = _relative(companion.difference[0], self._scale)
             return companion.system, apart, np.array(companion.components)
-        if self.reduced is None and self.shape is None:
+        if self.shape is None:
             return None
-        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
+        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=False)
         own, there = self._answer(self.system), self._answer(system)
-        scale = largest(own) if self.shape is None else min(largest(own), largest(there))
+        scale = min(largest(own), largest(there))
         return system, _relative(largest(there - own), scale), np.abs(there - own).max(axis=0)
 
     def _answer(self, system: Any, output: Output = tip) -> Array:
-        """Return an output (n, components) of a reduced model or an equilibrium in the run's system or another one.
+        """Return an output (1, components) of the equilibrium in the run's system or another one.
 
         Raises:
             ComputationError: there is none.
         """
-        own, same = self.reduced, system is self.system
-        if own is not None:
-            accuracy, bent = accuracy_of(self.scene), own.manifold is not None
-            there = own if same else reduced_response(system, own.times, self.start(system).q, accuracy, bent)
-            return np.asarray(there.tips * system.structure.lever)
         solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
-        if same and self.shape is not None:
+        if system is self.system and self.shape is not None:
             q = self.shape.copy()
         else:
             q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
@@ -188,9 +176,7 @@ class RunErrors:
 
     def _of_mesh(self, output: Output) -> float | None:
         """Return the error of an output by the mesh: its difference to the one on another mesh; None if unknown."""
-        own, other = self._answer(self.system, output), on_other_mesh(self.problem, self.system, self.shape is None)
-        if self.reduced is not None and not np.any(own):
-            return 0.0  # nothing moves it, on no mesh
+        own, other = self._answer(self.system, output), on_other_mesh(self.problem, self.system, moving=False)
         if other is None:
             return None
         try:
@@ -260,26 +246,6 @@ def _relative(apart: float, scale: float) -> float:
     if apart == 0.0:
         return 0.0
     return apart / scale if scale > 0.0 else 1.0
-
-
-def check_rotations(scene: Scene, system: Any) -> None:
-    """Refuse a linear model of motions whose rotations θ are too large: with foreshortening it errs by about θ²/2.
-
-    The rotations are those of the static shape under what acts in the frame. Of a free hub nothing is known
-    before its motion.
-
-    Args:
-        scene: with an accuracy.
-        system: of the linear theory.
-
-    Raises:
-        ComputationError: an answer of it would not be within the accuracy.
-    """
-    if scene.time is None or scene.accuracy is None or system.hub is not None:
-        return
-    rotation = static_rotation(system, scene.time.end)
-    if rotation**2 / 2 > scene.accuracy:
-        raise ComputationError(f"rotations of about {rotation:.2g} are too large for {scene.model.theory}")
 
 
 def output_of(scene: Scene) -> str:

@@ -45,14 +45,10 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []
-    time, model = s["timings"], s.get("reduced")
+    time = s["timings"]
     took = f"{time['total']:.2f} s: compilation {time['compile']:.2f} s"
-    if model is None:
-        how = f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {took}"
-        return [*lines, f"{how}, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"], []
-    how = f"reduced model of {model['vectors']} shapes, {model['steps']} time steps, {took}"
-    errors = f"shapes {percent(model['projection_error'])}, time steps {percent(model['time_error'])}"
-    return [*lines, f"{how}, reduction {time['reduce']:.2f} s; its error: {errors}"], []
+    how = f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {took}"
+    return [*lines, f"{how}, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"], []
 
 
 def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:

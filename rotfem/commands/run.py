@@ -18,19 +18,18 @@ from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import SMOOTHER, March, Steps, switches_of
-from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.error_report import RunErrors, check_rotations, output_of
+from rotfem.commands.error_report import RunErrors, output_of
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
-from rotfem.commands.recorder import Log, Monitor, Recorder, reduced_history
+from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
@@ -75,24 +74,21 @@ class Simulation:
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         check_rotating(problem, "a run")
-        by_basis = scene.time is not None and bool(scene.model.reduced)
-        if scene.time is not None and not (by_basis or scene.model.all_unknowns or scene.initial.first is not None):
+        if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
         self.system: Any = compile_system(problem, there, moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
-        critical = None if by_basis else critical_speed(self.system)
-        self.monitor = Monitor(self.system, critical)
+        self.monitor = Monitor(self.system, critical_speed(self.system))
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
-        #: What the states came from: of a march its stepper, companions and rows between steps; or a reduced model.
+        #: What the states came from: of a march its stepper, companions and rows between steps.
         self.stepper: Stepper | None = None
         self.companions: HistoryErrors | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
-        self.reduced: Response | None = None
         self.shape: Array | None = None
 
     def run(self, progress: Progress | None = None) -> RunResult:
@@ -110,8 +106,7 @@ class Simulation:
                 self.start = Start() if self.store.goes_on else self._start(self.system)
                 self.monitor.stability = self.start.stability
                 self.log.warnings += self.start.warnings
-                if not (self.scene.model.reduced and self._by_reduced_model(progress)):
-                    self._march(self.scene.time, progress)
+                self._march(self.scene.time, progress)
         except ComputationError as error:
             failure = self._with_cause(error)
             failure.result = self.result("failed", failure)
@@ -140,19 +135,6 @@ class Simulation:
                     f"{self.problem.theory.name} stiffness is singular"
                 )
             log.warnings.append(said)
-
-    def _by_reduced_model(self, progress: Progress) -> bool:
-        """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
-        self.store.start(self._memory())
-        with self.store.interrupts():
-            self.reduced = reduced_history(
-                self.scene, self.system, self.start.q, self.record, self.monitor, self.log, self.setting is not None
-            )
-        if self.reduced is None:
-            self.monitor.critical = critical_speed(self.system)
-            return False
-        progress(1.0)
-        return True
 
     def _march(self, time: Time, progress: Progress) -> None:
         """March through the history."""
@@ -236,7 +218,7 @@ class Simulation:
             )
         errors = RunErrors(
             *(self.scene, self.system, history, self._wants_error, watched),
-            *(self.shape, self.reduced, self.companions, self.stepper, self._start),
+            *(self.shape, self.companions, self.stepper, self._start),
         )
         theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
         log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
@@ -246,7 +228,6 @@ class Simulation:
             name: part.summary()
             for name, part in (
                 ("stress", self.record.resultants),
-                ("reduced", self.reduced),
                 ("error", error),
                 ("theory_error", theory),
                 ("stability", watched.stability),
@@ -278,8 +259,6 @@ class Simulation:
         scene, system, log, stepper = self.scene, self.system, self.log, self.stepper
         space, mesh = system.V.dofmap, system.structure.mesh
         parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
-        if self.reduced is not None:
-            parts["reduce"] = self.reduced.seconds["wall"]
         before = {"before": log.elapsed} if log.resumed else {}
         out = {
             **summary("run", scene, self.comm, system.comm),
@@ -390,8 +369,6 @@ def simulate(
         if scene.accuracy is None:
             also, critical = hints_of_start(variant, simulation.problem), simulation.monitor.critical
             simulation.log.advice = advise(variant, hint, critical=critical, also=also)
-        elif setting is not None and setting.reduced:
-            check_rotations(variant, simulation.system)
         return simulation.run(progress)
 
     with input_of(scene.file):

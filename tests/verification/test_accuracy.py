@@ -73,14 +73,6 @@ def test_the_truth_is_as_near_as_was_asked(name: str, accuracy: float) -> None:
     assert result.summary["warnings"] == []
 
 
-def test_the_cheapest_model_is_taken_that_serves() -> None:
-    """A slow spin-up is a linear motion; at a tenth of the accuracy the fast one is not."""
-    told = asked("small", 1e-2).summary["accuracy"]
-    assert told["chosen"]["reduced"]
-    chosen = asked("spin-up", 1e-4).summary["accuracy"]["chosen"]
-    assert (chosen["theory"], chosen["reduced"]) == ("reissner", False)
-
-
 def test_rows_are_where_they_were_asked_for() -> None:
     """However long the steps are; between them the tip is as good as at their ends."""
     result = run(scene("spin-up", **{"time.step": 0.25, "time.output_every": 2}))
