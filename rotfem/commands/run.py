@@ -196,11 +196,7 @@ class Simulation:
     def _memory(self) -> Memory:
         """Return what a checkpoint holds."""
         assert self.scene.time is not None
-        companions = [] if self.companions is None else self.companions.companions
-        return Memory(
-            *(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log),
-            *(companions, self.setting),
-        )
+        return Memory(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log, self.setting)
 
     # --- the result -------------------------------------------------------------------------------------------------
 
@@ -376,7 +372,7 @@ def simulate(
             check_steady(Problem.of(scene, terms=terms, outputs=outputs))
         if scene.accuracy is not None:
             refuse(scene, ("tip", ROOT_MOMENT), "run")
-            return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
+            return to_accuracy(scene, store.setting or first_setting(scene), compute, clock)
         if scene.model.tolerance is not None:
-            return within_tolerance(scene, compute, comm, store.setting())
+            return within_tolerance(scene, compute, comm, store.setting)
         return compute()

@@ -297,8 +297,8 @@ class RunStore:
         if left >= 1 - 1e-6 and (asked or due or (time.step is not None and left < 2 - 1e-6)):
             self._save(state)
         if asked:
-            if self._live is not None:
-                self._live.flush()
+            if self.folder is not None:  # at once: mpirun gives its processes a quarter of a second to end
+                self.folder.first_does(self._secure)
             raise Stopped
 
     def _agreed(self) -> tuple[bool, bool]:
@@ -320,6 +320,13 @@ class RunStore:
             asked, (_, late, pace) = any(rank[0] for rank in told), told[0]
             self._next = steps + max(1, int(0.05 / max(pace, 1e-9)))
         return asked, due or late
+
+    def _secure(self) -> None:
+        """Put the rows so far on disk, and say that the run was interrupted."""
+        assert self.folder is not None
+        if self._live is not None:
+            self._live.flush()
+        self.folder.summarise({**self.folder.summary, "status": "interrupted"})
 
     def _save(self, state: State) -> None:
         """Write a checkpoint."""

@@ -17,7 +17,6 @@ from contextlib import AbstractContextManager, suppress
 from math import inf
 from pathlib import Path
 from time import monotonic
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError
@@ -48,9 +47,6 @@ RESULTS = re.compile(
 
 #: Names of what `cost` and `sweep` go on with, which stays.
 KEPT = ("cost.jsonl", "points")
-
-#: In the place of an MPI communicator where there is one process.
-ONE_PROCESS = SimpleNamespace(rank=0, size=1, bcast=lambda value: value, allgather=lambda value: [value])
 
 
 class ResultFolder(AbstractContextManager["ResultFolder"]):
@@ -97,10 +93,10 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
                 done = work()
             except (OutputError, SceneError) as error:
                 problem = error
-        done, problem = self.comm.bcast((done, problem))
-        if problem is not None:
-            raise problem
-        return done  # type: ignore[return-value]
+        found: tuple[T, OutputError | SceneError | None] = self.comm.bcast((done, problem))
+        if found[1] is not None:
+            raise found[1]
+        return found[0]
 
     def begin(self, keep: Collection[str] = ()) -> None:
         """Say that a computation is running, and remove the results of the one before but for some names.
@@ -193,14 +189,14 @@ def check_own(folder: Path, inputs: Iterable[Path] = ()) -> None:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     foreign = [entry.name for entry in entries if entry.name not in KEPT and not entry.name.startswith(PART)]
     if foreign and not is_ours(read_summary(folder)):
-        raise OutputError(folder, f"{foreign[0]} is there, and no results of rotfem")
+        raise OutputError(folder, f"it holds {foreign[0]}, and no results of rotfem")
     for entry in entries:
         if entry.is_symlink():
             raise OutputError(folder / entry.name, "it is a symbolic link, which is not followed")
     top = Path(os.path.realpath(folder))
     for path in inputs:
         if Path(os.path.realpath(path)).is_relative_to(top):
-            raise OutputError(folder, f"{path} is there, which the scene reads")
+            raise OutputError(folder, f"it holds {path}, which is read")
 
 
 def is_ours(summary: Mapping[str, Any]) -> bool:
