@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,12 +20,11 @@ from rotfem.commands.recorder import Monitor
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.companion import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS, Output, largest, of_columns, sizes, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
-from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +44,6 @@ class RunErrors:
         wanted: whether errors are to be estimated.
         monitor: what has seen its states.
         shape: the equilibrium, a local dof array; None of a history.
-        companions: of a march; None without them.
         stepper: of a march; None of others.
         start: returns what the history starts from in another system of the problem.
     """
@@ -56,7 +54,6 @@ class RunErrors:
     wanted: bool
     monitor: Monitor
     shape: Array | None
-    companions: HistoryErrors | None
     stepper: Any
     start: Callable[[Any], Start]
 
@@ -82,10 +79,7 @@ class RunErrors:
         scale = largest(of_columns(of, self.history, self.system.structure))
         contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
-        if self.companions is not None:
-            contributions = self.companions.errors(scale)
-            found["time_at"] = self.companions.steps.difference[1]
-        elif self.shape is not None:
+        if self.shape is not None:
             contributions = {"time": 0.0, "space": self._of_mesh(OUTPUTS[of])}
         return ErrorEstimate({**contributions, "model": None if self.theory is None else self.theory.estimate}, found)
 
@@ -99,7 +93,7 @@ class RunErrors:
         in_balance = self.scene.time is not None and self.scene.initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self._drifting(self.monitor.farthest.error(self.system, tips, in_balance))
+            return self.monitor.farthest.error(self.system, tips, in_balance)
         try:
             found = self._apart(richer) if self.wanted else None
         except (ComputationError, InputError):
@@ -119,25 +113,6 @@ class RunErrors:
         own = {f"tip_{name}": d / size for name, d, size, known in each if known}
         return base.of_poorer(self.problem.theory, apart, own)
 
-    def _drifting(self, found: TheoryError | None) -> TheoryError | None:
-        """Return the error of a linear theory with that of the phase of a vibration that nothing drives."""
-        own = self.system
-        free = self.scene.time is not None and own.hub is None and own.linear and own.model.closed
-        if found is None or not (free and self.wanted):
-            return found
-        system = own.twin()
-        start = self.start(system)
-        q, v = (system.zeros() if x is None else x for x in (start.q, start.v))
-        try:
-            off = phase_drift(self.problem, system, (q, v), self.history["t"][-1], Newton.of(self.scene.solver))
-        except (ComputationError, InputError):
-            off = None
-        if off is None:
-            return None
-        part = _relative(off, self._scale)
-        basis = "its frequencies and strains compared with the exact ones"
-        return replace(found, estimate=found.estimate + part, basis=basis) if part > 0.0 else found
-
     def _apart(self, richer: Problem) -> tuple[Any, float, Array] | None:
         """Return the system of a richer theory, how far its tip is from the run's, relative, and by components, m.
 
@@ -147,13 +122,6 @@ class RunErrors:
             ComputationError: there is no answer in that theory.
             InputError: it cannot have what the problem has.
         """
-        if self.companions is not None:
-            self.companions.steps.finish()
-            companion = self.companions.theory
-            if companion is None or not companion.sound or not self.companions.steps.sound:
-                return None
-            apart = _relative(companion.difference[0], self._scale)
-            return companion.system, apart, np.array(companion.components)
         if self.shape is None:
             return None
         system = compile_system(richer.replace(outputs={}), self.system.comm, moving=False)
@@ -200,7 +168,7 @@ class RunErrors:
         if unknown:
             why = self._why_unknown(error)
             said = [f"the error by the {' and the '.join(unknown)} could not be estimated: {why}"]
-        allowed = max(NOTICED, scene.model.tolerance or 0.0, (time and time.tolerance) or 0.0)
+        allowed = max(NOTICED, (time and time.tolerance) or 0.0)
         if error.total is None or error.total <= allowed:
             return said
         steps, mesh, model = sizes = [error.contributions[name] or 0.0 for name in NAMES]
@@ -226,10 +194,8 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        if self.companions is not None and error.contributions["time"] is None:
-            if self.companions.steps.sound:
-                return "the prescribed motion or loads allow no steps of twice the length"
-            return "a run with steps of twice the length failed, so these are hardly short enough"
+        if error.contributions["time"] is None:
+            return "errors of histories are not estimated"
         if error.contributions["space"] is None:
             return "there is no other mesh to compare with, or the run failed on it"
         return "the run failed with a more exact theory"
@@ -246,6 +212,12 @@ def _relative(apart: float, scale: float) -> float:
     if apart == 0.0:
         return 0.0
     return apart / scale if scale > 0.0 else 1.0
+
+
+def richer_problem(problem: Problem) -> Problem | None:
+    """Return a problem in the richer theory that it is compared with; None where there is none."""
+    richer = compared(problem.theory, problem.structure.type)
+    return None if richer is None else problem.replace(theory=richer)
 
 
 def output_of(scene: Scene) -> str:

@@ -41,7 +41,7 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     ]
     if "left_out" in s:
         lines.append(f"not computed, as nothing excites it: {', '.join(s['left_out']['unknowns'])}")
-    lines += choice_report(s)
+    lines += accuracy_report(s)
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []
@@ -57,7 +57,7 @@ def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
         f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds ({s['speeds_solved']} solved to follow the modes), "
         f"{s['dofs']} unknowns, in {s['timings']['total']:.2f} s"
     )
-    return [line, *choice_report(s)], []
+    return [line, *accuracy_report(s)], []
 
 
 def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -71,7 +71,7 @@ def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `explain` prints before and after its tables."""
     absent = ", ".join(f"{name} ({why})" for name, why in s["absent_effects"].items())
-    after = [*choice_report(s), *([f"effects without data: {absent}"] if absent else [])]
+    after = [*accuracy_report(s), *([f"effects without data: {absent}"] if absent else [])]
     return [f"{s['name']}: {s['theory']} theory, in {s['timings']['total']:.2f} s", effects(s)], after
 
 
@@ -87,7 +87,7 @@ def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 _AROUND = {
     "run": of_run,
     "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
-    "modes": lambda s: ([about(s), effects(s), *choice_report(s)], []),
+    "modes": lambda s: ([about(s), effects(s), *accuracy_report(s)], []),
     "campbell": of_campbell,
     "response": of_response,
     "explain": of_explain,
@@ -119,15 +119,3 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
     tries = len(wanted["attempts"])
     attempts = "" if tries == 1 else f" after {tries} attempts"
     return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {Setting.of(wanted['chosen']).words()}"]
-
-
-def choice_report(summary: dict[str, Any]) -> list[str]:
-    """Return the line that says which model was chosen, if one was."""
-    choice = summary.get("choice")
-    if choice is None:
-        return accuracy_report(summary)
-    dropped = ", ".join(row["name"] for row in choice["dropped"]) or "none"
-    error = f"estimated error {percent(choice['estimated_error'])} of {percent(choice['tolerance'])} allowed"
-    return [
-        f"model chosen in {choice['seconds']:.2f} s: {choice['theory']} theory; effects left out: {dropped}; {error}"
-    ]

@@ -22,9 +22,9 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
-from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.error_report import RunErrors, output_of
+from rotfem.commands.error_report import RunErrors
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
@@ -38,8 +38,6 @@ from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.companion import HistoryErrors, richer_problem
-from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
@@ -84,9 +82,8 @@ class Simulation:
         self.monitor = Monitor(self.system, critical_speed(self.system))
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
-        #: What the states came from: of a march its stepper, companions and rows between steps.
+        #: What the states came from: of a march its stepper and rows between steps.
         self.stepper: Stepper | None = None
-        self.companions: HistoryErrors | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
         self.shape: Array | None = None
@@ -141,10 +138,6 @@ class Simulation:
         scheme, newton = scheme_of(time), self.iteration
         march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
         self.stepper = march.stepper
-        if self._wants_error:
-            of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
-            self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
-            self.stepper.observers.append(self.companions)
         march.reached = self.store.start(self._memory())
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
@@ -160,13 +153,6 @@ class Simulation:
         there = system.model.problem
         problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
         return first_state(self.scene, problem, system, judged=system is self.system)
-
-    def _start_there(self, system: Any) -> tuple[Array | None, Array | None]:
-        """Return the shape and the velocities that a companion starts from."""
-        nodes = [s.V.dofmap.index_map.size_global for s in (system, self.system)]
-        same = nodes[0] == nodes[1] and system.model.problem.theory == self.problem.theory
-        start = self.start if self.store.goes_on or same else self._start(system)
-        return start.q, start.v
 
     # --- what sees them ---------------------------------------------------------------------------------------------
 
@@ -214,7 +200,7 @@ class Simulation:
             )
         errors = RunErrors(
             *(self.scene, self.system, history, self._wants_error, watched),
-            *(self.shape, self.companions, self.stepper, self._start),
+            *(self.shape, self.stepper, self._start),
         )
         theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
         log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
@@ -351,10 +337,10 @@ def simulate(
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
 
     Raises:
-        Missed: its accuracy, or its model.tolerance with model.on_exceed = "stop", was not met.
+        Missed: its accuracy was not met.
         ComputationError: the richest model failed.
     """
-    comm, clock = store.comm, Clock(scene.accuracy_budget, store.comm, hint)
+    clock = Clock(scene.accuracy_budget, store.comm, hint)
     scene.check_run()
     store.open(scene, terms or {}, outputs or {})
 
@@ -372,7 +358,5 @@ def simulate(
             check_steady(Problem.of(scene, terms=terms, outputs=outputs))
         if scene.accuracy is not None:
             refuse(scene, ("tip", ROOT_MOMENT), "run")
-            return to_accuracy(scene, store.setting or first_setting(scene), compute, clock)
-        if scene.model.tolerance is not None:
-            return within_tolerance(scene, compute, comm, store.setting)
+            return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
         return compute()

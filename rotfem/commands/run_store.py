@@ -213,7 +213,6 @@ class RunStore:
         """Whether there is a checkpoint to go on from."""
         return self._tree is not None
 
-    @property
     def setting(self) -> Any:
         """Setting of the run that goes on, which an accuracy has led to; None without."""
         return None if self._tree is None else self._tree["setting"]

@@ -366,7 +366,7 @@ def check_prestress(structure: Any, model: Model) -> None:
         raise problem("model.prestress", model.prestress, why)
     if kind == "plate":
         raise problem("model.prestress", model.prestress, "is for beams: that of a plate is of its membrane forces")
-    if not registry.theories[model.theory].prestress and model.tolerance is None:
+    if not registry.theories[model.theory].prestress:
         able = (show(theory.name) for theory in registry.theories if kind in theory.prestress)
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
@@ -445,8 +445,5 @@ def check_accuracy(scene: Scene) -> None:
             reason = "is what an accuracy may take, and needs accuracy"
             raise problem("accuracy_budget", scene.accuracy_budget, reason)
         return
-    if scene.model.tolerance is not None:
-        reason = "cannot be combined with accuracy, which allows the model a share of its own"
-        raise problem("model.tolerance", scene.model.tolerance, reason)
     if not scene.output.error:
         raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")

@@ -49,6 +49,12 @@ Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
 Integration = Literal["reduced", "full"]
 
 
+_LADDER = 'it went with version 0.9; "accuracy" chooses theory, mesh and steps, "rotfem explain" compares theories'
+_REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
+#: Keys of [model] in earlier versions ↦ what takes their place.
+GONE = {"tolerance": _LADDER, "on_exceed": _LADDER, "reduced": _REDUCED, "foreshortening": _REDUCED}
+
+
 class Model(SceneModel):
     """The [model] table.
 
@@ -58,9 +64,6 @@ class Model(SceneModel):
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
             "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".
-        tolerance: largest estimated error of a cheaper theory that is used instead, or None.
-        on_exceed: if the named theory misses the tolerance, too, "stop" ends with exit status 3; "upgrade" and "warn"
-            warn.
         all_unknowns: whether a history keeps unknowns that are zero by symmetry.
     """
 
@@ -68,21 +71,14 @@ class Model(SceneModel):
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     prestress: Literal["axial", "all"] | None = None
-    tolerance: Positive | None = None
-    on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
     all_unknowns: bool = False
 
     @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        for key in ("reduced", "foreshortening"):
+        for key, instead in GONE.items():
             if key in data:
-                why = "unknown key; reduced models went with version 0.9: leave it out, the full system is computed"
-                raise problem(key, None, why)
+                raise problem(key, None, f"unknown key; {instead}")
         return data
-
-    def _check(self) -> None:
-        if self.tolerance is not None and self.frame == "inertial":
-            raise problem("tolerance", self.tolerance, 'needs frame = "rotating", as the cheaper theories do')
 
 
 def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:

@@ -31,8 +31,6 @@ def test_scenes_ask_for_an_accuracy() -> None:
     for key, value in (("accuracy", 0.9), ("accuracy", 0), ("accuracy", "fine"), ("accuracy_of", "root")):
         with pytest.raises(SceneError, match=key):
             scene.replace({key: value})
-    with pytest.raises(SceneError, match="cannot be combined with accuracy"):
-        scene.replace({"model.tolerance": 1e-3})
 
 
 def test_a_plate_begins_with_few_cells_of_its_proportions() -> None:
