@@ -214,7 +214,7 @@ class RunStore:
         return self._tree is not None
 
     def setting(self) -> Any:
-        """Setting of the run that goes on, which an accuracy has led to; None without."""
+        """Return the setting of the run that goes on, which an accuracy has led to; None without."""
         return None if self._tree is None else self._tree["setting"]
 
     def open(self, scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> None:

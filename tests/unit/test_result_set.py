@@ -57,6 +57,13 @@ def test_a_folder_of_somebody_else_is_refused(tmp_path: Path, name: str) -> None
     assert contents(tmp_path) == before
 
 
+def test_a_folder_is_made_where_that_is_possible(tmp_path: Path) -> None:
+    run_result(1.0).write(tmp_path / "a" / "b")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"file/below.*cannot be written.*-o DIR"):
+        run_result(1.0).write(tmp_path / "file" / "below")
+
+
 def test_what_a_study_goes_on_with_is_no_obstacle(tmp_path: Path) -> None:
     (tmp_path / "points").mkdir()
     (tmp_path / "cost.jsonl").write_text("{}\n")
