@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import threading
 from collections.abc import Iterator
@@ -37,6 +38,18 @@ def held_back() -> Iterator[None]:
             handler(first, frame)
         elif handler == signal.SIG_DFL:
             signal.raise_signal(first)
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Hold signals back as `held_back` does, and collect no garbage: what is imported stays, and is seen no more."""
+    gc.disable()
+    try:
+        with held_back():
+            yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:

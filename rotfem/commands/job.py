@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.interrupts import held_back
+from rotfem.commands.interrupts import importing
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.units import seconds_of
 from rotfem.version import __version__
@@ -145,7 +145,7 @@ def job(
     debug: Debug = False,
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
-    with held_back():  # in the middle of an import what signals raise becomes any error
+    with importing():  # in the middle of an import what signals raise becomes any error
         from rotfem.scene import load_scene
 
     with Session(as_json, quiet, debug) as session:
@@ -161,7 +161,7 @@ def job(
         if output is None and loaded.name in ("", ".", ".."):
             raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
         folder = session.folder(output or Path("results", loaded.name, command), command, loaded.inputs)
-        with held_back():
+        with importing():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         if report and find_spec("bokeh") is None:
             raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")

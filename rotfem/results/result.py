@@ -221,8 +221,17 @@ def image(figure: Figure, dpi: int, format: str = "png") -> bytes:
     Raises:
         ValueError: Matplotlib does not write that format.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     file = BytesIO()
-    figure.savefig(file, format=format, dpi=dpi)
+    if format != "png":
+        figure.savefig(file, format=format, dpi=dpi)
+        return file.getvalue()
+    before, figure.dpi = figure.dpi, dpi
+    try:
+        FigureCanvasAgg(figure).print_png(file)  # `savefig` would draw all twice
+    finally:
+        figure.dpi = before
     return file.getvalue()
 
 
