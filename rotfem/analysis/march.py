@@ -58,8 +58,8 @@ LARGEST_LINEAR_DEFLECTION = 1.0
 #: Halvings of a fixed step that cannot be solved.
 HALVINGS = 5
 
-#: Newton iterations from which on a solution counts as a long one.
-LONG = 6
+#: Newton iterations after which a solution counts as a long one, and up to which the prediction was good.
+LONG, SHORT = 6, 3
 
 #: Error of a step that the controller aims at, as a part of the allowed one: a vibration's local error is its largest
 #: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps, also of one that was not solved.
@@ -73,8 +73,8 @@ MOST_STEPS, MEAN = 500_000, 5000
 
 #: What to do then.
 QUICKER = (
-    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what is quicker than they are; a looser time.tolerance; or "
-    "an earlier time.end"
+    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what "
+    "is quicker than they are; a looser time.tolerance; or an earlier time.end"
 )
 
 
@@ -103,9 +103,10 @@ class March:
         self.observers = list[Observer]()
         self.substeps = self.rejected = 0
         self._q, self._v = np.zeros_like(system.q.x.array) if q is None else q, v
-        #: Factors (1, c_v, c_a) of the tangent whose factor is kept; whether the last solution was a long one.
+        #: Factors (1, c_v, c_a) of the tangent whose factor is kept; whether the last solution was a long one, and the
+        #: part of a predicted move that it confirmed.
         self._factored: tuple[float, ...] | None = None
-        self._far = False
+        self._far, self._trust = False, 1.0
 
     def __iter__(self) -> Iterator[State]:
         """Yield the state at t = 0, unless it goes on from a later one, and at the end of every step.
@@ -162,7 +163,7 @@ class March:
 
         def next_leg() -> tuple[Leg, State]:
             leg = self._leg(state, min(pace.h, longest), knots, error, tolerance * pace.largest)
-            return leg, self.begun(state, seen, leg)
+            return leg, self.begun(state, seen, leg) if seen.side else state  # between fits what jumps is negligible
 
         leg, start = next_leg()
         for number in range(1, MOST_STEPS + 1):
@@ -188,10 +189,14 @@ class March:
                     raise too_short(shortest, state.t)
                 leg, start = next_leg()
                 continue
-            ratio = max(ratio / AIM, 1e-12)
-            factor = float(np.clip((ratio * pace.error) ** (-1 / (6 * k)), SHRINK, self.scheme.growth if grows else 1))
-            h = leg.length * factor if leg.length >= pace.h or factor < 1.0 else pace.h
-            pace, grows = Pace(min(longest, h), ratio, largest), True
+            wanted, ratio = min(pace.h, longest), max(ratio / AIM, 1e-12)
+            if leg.length < SHRINK * wanted:  # cut short by a knot: of longer steps its error says nothing
+                pace = replace(pace, largest=largest)
+            else:
+                ratio *= max(wanted / leg.length, 1.0) ** k
+                factor = np.clip((ratio * pace.error) ** (-1 / (6 * k)), SHRINK, self.scheme.growth if grows else 1.0)
+                pace = Pace(float(max(wanted, leg.length) * factor), ratio, largest)
+            grows = True
             self._observed(start, new)
             state, seen = new, leg.finish
             if state.t >= end:
@@ -212,8 +217,8 @@ class March:
     def _leg(self, state: State, wanted: float, knots: Array, error: LocalError, allowed: float) -> Leg:
         """Return an interval from a state on that is about as long as wanted.
 
-        It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible: then
-        they are their best cubics in it.
+        It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible:
+        then they are their best cubics in it.
         """
         t, end = state.t, float(self.steps.end)
         left = end - t
@@ -295,7 +300,7 @@ class March:
         return turned if stage.over is None else (state.q + turned) / 2
 
     def solve(self, stage: Stage, state: State) -> None:
-        """Solve a stage of a step from a state, by Newton's method from its prediction.
+        """Solve a stage of a step from a state, by Newton's method from its prediction; if that fails, from the state.
 
         Of a large system a factor serves as long as increments shrink by it (see `Factor`).
 
@@ -309,7 +314,9 @@ class March:
         s.prescribe(stage.t, stage.q, stage.v, stage.a)
         settles = s.linear and s.settled and not s.current  # the matrix stays from now on, the factor is of another
         factor = Factor(self._factored == stage.shifts and not settles) if s.keeps_factor else None
-        before, made = state.q, 0
+        before, made, move = state.q, 0, stage.q - state.q
+        if self._trust < 1.0 and not s.linear:
+            stage.correct((self._trust - 1.0) * move)
 
         def increment(renewed: bool) -> tuple[float, bool]:
             """Correct the stage; return the size of the correction, and whether it is exact."""
@@ -325,13 +332,25 @@ class March:
             stage.correct(dq if size <= REACH else dq * (REACH / size))
             return size, False
 
+        def size() -> float:
+            return float(s.size(stage.q))
+
         try:
-            self.newton.solve(increment, lambda: float(s.size(stage.q)), factor)
+            try:
+                self.newton.solve(increment, size, factor)
+            except ComputationError:
+                if s.solved_at_once or self._trust == 0.0:
+                    raise
+                self._far, self._trust, before, made = True, 0.0, state.q, 0
+                stage.correct(state.q - stage.q)
+                self.newton.solve(increment, size)
         except ComputationError as error:
-            self._factored, self._far = None, True
+            self._factored = None
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
         self._factored = stage.shifts if s.keeps_factor else None
         self._far = made > LONG
+        if made > SHORT or self._trust < 1.0:
+            self._trust = trusted_part(s, stage.q - state.q, move)
         if stage.over is not None and s is not self.system:
             stage.memory = s.finish(stage)
         if self.newton.diverging and not s.solved_at_once:
@@ -437,6 +456,17 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
     state.jump = None if state.jump is None else a - second[1]
     state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
     return True
+
+
+def trusted_part(system: Any, move: Array, predicted: Array) -> float:
+    """Return the part c of a predicted move p that is closest to the computed move m: m·p/p·p, cut to 0 … 1.
+
+    It is 1 where the motion is smooth. Of vibrations that the steps do not resolve a prediction by constant
+    acceleration is worse than none, as h²q̈ is much larger than they are.
+    """
+    length = system.product(predicted, predicted)
+    part = float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0
+    return part if part < 0.9 else 1.0
 
 
 def check_root(system: Any, stage: Stage) -> None:

@@ -87,7 +87,7 @@ class TimeGrid:
         ends, knots = [float(t) for t in self.times], after[1:] > after[:-1]
         begin, length = ends[0], self.step
         for i, end in enumerate(ends[1:]):
-            inside: list[float] = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
+            inside: Any = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
             lands = bool(knots[i] and before[i + 1] < after[i + 1])
             last = float(self.knots[before[i + 1]]) if lands else end
             stops = [*inside, last] if self.lands and len(inside) <= FEW else [last]
@@ -104,11 +104,12 @@ class TimeGrid:
                 begin = stop
 
 
-def knots_of(signals: Sequence[TimeSignal], times: Array, breakpoints: Sequence[float] = ()) -> Array:
+def knots_of(signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = ()) -> Array:
     """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints."""
     for signal in signals:
         find_jumps(signal, times, breakpoints)
-    return np.unique(np.concatenate([breakpoints, *(s.knots for s in signals)]))
+    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *(s.knots for s in signals)]))
+    return found
 
 
 def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:
