@@ -147,7 +147,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ("`[mesh]` of a plate", settings.PlateMesh, "toml plate\n[mesh]\nelements = [16, 4]\ncell = 'triangle'"),
     ("`[time]`", settings.Time, "toml\n[time]\nend = 20.0\ntolerance = 1e-4\nscheme = 'esdirk4'\noutput_step = 0.02"),
     ("`[modes]`", settings.Modes, "toml\n[modes]\ncount = 8\nabout = 'steady'"),
-    ("`[solver]`", settings.Solver, "toml\n[solver]\ncontinuation = 'arc_length'"),
+    ("`[solver]`", settings.Solver, "toml\n[solver]\nmax_iterations = 50"),
     (
         "`[output]`",
         settings.OutputTable,

@@ -319,18 +319,19 @@ class Solver(SceneModel):
     Attributes:
         increment_tolerance: Newton's method stops at this relative size of the increment.
         max_iterations: most Newton iterations per solve.
-        continuation: how an equilibrium is reached: "load", growing with it up to the first limit point, or
-            "arc_length", along the path of equilibria past limit points.
     """
 
     increment_tolerance: Positive = 1e-9
     max_iterations: Count = 25
-    continuation: Literal["load", "arc_length"] = "load"
 
-    @property
-    def past_limits(self) -> bool:
-        """Whether a path of equilibria is followed past limit points."""
-        return self.continuation == "arc_length"
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        if "continuation" in data:
+            why = (
+                "unknown key; paths past limit points went with version 0.9: leave it out, the load is raised in steps"
+            )
+            raise problem("continuation", None, why)
+        return data
 
 
 def _as_quantities(value: Any) -> tuple[str, ...]:
