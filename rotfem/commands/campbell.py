@@ -124,6 +124,7 @@ def diagram(
     started: float,
     progress: Progress | None = None,
     hint: Hint | None = None,
+    only: bool = False,
 ) -> CampbellResult:
     """Return the branches over speed, with what the diagram says.
 
@@ -134,12 +135,13 @@ def diagram(
         started: `perf_counter()` at the start.
         progress: see `campbell`.
         hint: see `campbell`.
+        only: see `campbell`.
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
     reduced = in_basis(analysis, values, count + SPARE)
     analysis = reduced or analysis
-    sweep = Sweep(analysis, count, scene.limits.speeds)
+    sweep = Sweep(analysis, count, only)
     if analysis.everyone.size > analysis.comm.size:  # each process has a copy
         if reduced is None:
             sweep.known = solved_by_all(analysis, values, count, progress)
@@ -193,6 +195,7 @@ def diagram(
         "instabilities": onsets,
         "ambiguous": sweep.ambiguous,
         "speeds": len(values),
+        "speeds_inserted": sweep.inserted,
         "speeds_solved": sweep.solves,
         **({"error": error_of_modes(rows, off).summary()} if scene.output.error else {}),
         "checks": self_checks(analysis, sweep.points[-1].spinning),
@@ -231,11 +234,6 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
     last = sweep.points[-1]
     lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
     out = []
-    if sweep.unresolved:
-        out.append(
-            f"the branches change too fast to be followed: {sweep.solves} speeds were solved, and no more were added "
-            "between those asked for"
-        )
     out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
