@@ -208,7 +208,6 @@ def main() -> None:
                 told = answer.summary["accuracy"]
                 chosen = told["chosen"]
                 line += f" ({len(told['attempts'])} tried: {chosen['theory']}"
-                line += ", reduced" if chosen.get("reduced") else ""
                 line += f", {chosen.get('scheme', '')} {chosen.get('step', chosen.get('tolerance', 0)):.2g}"
                 line += f", {chosen.get('elements')} P{chosen['degree']})"
             else:

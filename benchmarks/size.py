@@ -26,11 +26,10 @@ CAPABILITIES = {
         refinement commands.cost commands.explain commands.accuracy commands.ahead
         commands.attempts commands.known_error commands.pace commands.pursuit commands.root_accuracy
         analysis.error_ analysis.frequency_error
-        analysis.mesh_estimate analysis.mesh_force analysis.reduced_tangents analysis.refined_mesh
+        analysis.mesh_estimate analysis.mesh_force analysis.refined_mesh
         analysis.ritz_vectors analysis.shape_error analysis.theory_error analysis.tip_track
         analysis.turning_view equations.finer numerics.extended_cells numerics.refinement
     """,
-    "reduced models": "analysis.reduced commands.reduced_history",
     "time integration": """
         analysis.time analysis.march analysis.schemes analysis.dense_output
         analysis.dense_output analysis.energy_conserving analysis.first_motion

@@ -19,12 +19,11 @@ from numpy.linalg import norm
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
-from rotfem.numerics.projection import dense, new_directions, orthonormal, summed, times, with_ghosts
+from rotfem.numerics.projection import dense, new_directions, orthonormal, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -61,6 +60,36 @@ def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> Re
 def product(A: Array, X: Array) -> Array:
     """Return A X of real A and complex X; numpy would make A complex first."""
     return np.asarray((A @ np.ascontiguousarray(X, dtype=complex).view(np.float64)).view(np.complex128))
+
+
+class ProjectedPieces:
+    """The matrices of a linear theory, M, C, K = Σ cₚ (piece p), in a basis V: VᵀMV, VᵀCV and VᵀKV.
+
+    Attributes:
+        kinds: "M", "C", "K" ↦ numbers of the pieces of that kind.
+        products: numbers of the pieces ↦ their products with the basis, owned rows (n, m).
+        small: "M", "C", "K" ↦ projected pieces (p, m, m).
+    """
+
+    def __init__(self, system: Any):
+        self.system = system
+        self.kinds = {kind: [i for i, p in enumerate(system.pieces) if p.kind == kind] for kind in "MCK"}
+        self.products: dict[int, Array] = {}
+        self.small: dict[str, Array] = {}
+
+    def project(self, V: Array) -> None:
+        """Project all pieces on a basis, owned rows (n, m)."""
+        comm, m = self.system.comm, V.shape[1]
+        matrices = [i for numbers in self.kinds.values() for i in numbers]
+        self.products = {i: times(self.system.pieces[i].operator, V) for i in matrices}
+        for kind, numbers in self.kinds.items():
+            projected = [summed(comm, V.T @ self.products[i]) for i in numbers]
+            self.small[kind] = np.array(projected).reshape(len(projected), m, m)
+
+    def operators(self, c: Array) -> tuple[Array, Array, Array]:
+        """Return M, C and K (n, m, m) from the factors of all pieces (n, pieces)."""
+        M, C, K = (np.asarray(np.tensordot(c[:, self.kinds[k]], self.small[k], 1)) for k in "MCK")
+        return M, C, K
 
 
 class SmallPencil(Pencil):
@@ -151,8 +180,7 @@ class ReducedAnalysis(ModalAnalysis):
 
     def __init__(self, full: ModalAnalysis):
         self.full = full
-        numbers = np.array([i for i, p in enumerate(full.system.pieces) if p.kind in "MCK"])
-        self.basis = ReducedModel(full.system, numbers)
+        self.basis = ProjectedPieces(full.system)
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
         self._asymmetries: dict[str, float] = {}
@@ -208,7 +236,7 @@ class ReducedAnalysis(ModalAnalysis):
         system, basis = self.system, self.basis
         # In the inertia instead, directions that have none would be lost.
         self.V = orthonormal(self.comm, np.array(self._columns).T, lambda X: times(system.material, X))
-        basis.take(with_ghosts(system.V, self.V))
+        basis.project(self.V)
         self._index = [i for kind in "MCK" for i in basis.kinds[kind]]
         self.mass = np.sum([basis.products[i] for i in basis.kinds["M"]], axis=0)
         self._root = root_of(basis.small["M"].sum(axis=0))
@@ -291,7 +319,8 @@ class Between:
     """Modes between two speeds that are solved, by interpolation of the pencil in a basis of the modes at both.
 
     M and C are polynomials of the speed Ω through what they are at the nodes, K is one of Ω², as the centrifugal force
-    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved, whatever round-off in K says.
+    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved,
+    whatever round-off in K says.
 
     Args:
         both: the modes at the ends.
@@ -313,7 +342,7 @@ class Between:
         self._asymmetries = {name: max(s.pencil.asymmetries[name] for s in both) for name in "MCK"}
         self._count = max(len(s.pairs.values) for s in both) + FURTHER
         for node, s in enumerate(nodes):
-            if s in both:
+            if any(s is end for end in both):
                 self._corrected(node, s)
 
     def _pencil(self, speed: float) -> SmallPencil:

@@ -32,7 +32,7 @@ from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
-from rotfem.numerics.projection import summed, times
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 
@@ -297,17 +297,3 @@ def _largest(A: Any, B: Any, restarts: int, which: Any = SLEPc.EPS.Which.LARGEST
     use_direct_solver(eps.getST().getKSP(), A.getSize()[0], symmetric=True)
     eps.solve()
     return float(eps.getEigenvalue(0).real) if eps.getConverged() else None
-
-
-def critical_speed_within(system: Any, V: Array) -> float | None:
-    """Return the critical speed (rad/s) of a linear theory in a basis, not less than its own; None if there is none.
-
-    Args:
-        system: equations of motion.
-        V: owned unknowns of the basis, shape (n, m).
-    """
-    K_1, K_2 = (summed(system.comm, V.T @ times(K, V)) for K in system.stiffness_pieces())
-    if not np.any(K_2):
-        return None
-    nu = float(np.linalg.eigvals(np.linalg.solve(K_1, -K_2)).real.max())
-    return float(1 / np.sqrt(nu)) if nu > 0 else None

@@ -172,21 +172,6 @@ def error_under_load(system: Any, motion: Motion, factor: DirectSolver | None = 
     return error_of_state(system, _static(system, factor) if is_estimated(system) else system.zeros())
 
 
-def static_rotation(system: Any, end: float) -> float:
-    """Return the largest rotation (rad) of shapes that rest in the frame under what acts on them at some instants.
-
-    Args:
-        system: equations of motion, the hub held.
-        end: last of them, s.
-    """
-    largest = 0.0
-    for t in np.linspace(0.0, end, 17):
-        system.set_time(float(t))
-        system.set_state(system.zeros())
-        largest = max(largest, _sizes(system, _static(system))[1])
-    return largest
-
-
 def _static(system: Any, factor: DirectSolver | None = None) -> Array:
     """Return what the forces at the undeformed state and time set displace the structure by, a local dof array."""
     solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))

@@ -8,10 +8,8 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any, TypeVar
 
-from mpi4py import MPI
-
 from rotfem.commands.interrupts import together
-from rotfem.errors import ComputationError, InputError, SceneError, Stopped
+from rotfem.errors import ComputationError, InputError, Stopped
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.refinement.estimate import WORDS
 from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
@@ -32,7 +30,7 @@ ROWS = 1000
 
 
 class Missed(ComputationError):
-    """No setting was found that meets the accuracy, or the tolerance of the model."""
+    """No setting was found that meets the accuracy."""
 
 
 def first_setting(scene: Scene, modes: int = 0) -> Setting:
@@ -49,7 +47,7 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
             elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
         else:
             elements = -(-nodes // mesh.degree)
-    first = Setting(models_of(scene, moving=time is not None), elements, degree_of(scene))
+    first = Setting(({"theory": scene.model.theory},), elements, degree_of(scene))
     if time is None:
         return first
     assert scene.accuracy is not None
@@ -68,26 +66,6 @@ def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
     growth = min(1.0, 24 / degree / max(elements))
     x, y = (max(math.ceil(n * growth), min(n, 3)) for n in elements)
     return x, y
-
-
-def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
-    """Return the keys of [model] of the models that a scene may be computed with, from the cheapest on.
-
-    The theory that a scene names is the richest of them. A history of small motions is cheapest by a reduced linear
-    model; steady states and modes cost little by any theory, and moments at the root are those of the theory itself.
-    """
-    full = {"theory": scene.model.theory, "reduced": False, "foreshortening": False}
-    linear = linear_of(scene)
-    if not moving or scene.accuracy_of == ROOT_MOMENT or linear is None:
-        return (full,)
-    assert scene.accuracy is not None
-    reduced = scene.accuracy / (4 * SAFETY)
-    quick = {"theory": linear.name, "reduced": reduced, "foreshortening": bool(linear.prestress)}
-    try:
-        scene.replace({f"model.{key}": value for key, value in quick.items()})
-    except SceneError:  # no reduced model has a torque by a controller
-        return (full,)
-    return quick, full
 
 
 def linear_of(scene: Scene) -> Theory | None:
@@ -176,70 +154,6 @@ def with_choice(timings: Mapping[str, float], started: float) -> dict[str, float
     """Return the timings of a result (s) with `choice`, what was used besides since a start, in their total."""
     choice = max(0.0, perf_counter() - started - timings["total"])
     return {**timings, "choice": choice, "total": timings["total"] + choice}
-
-
-def within_tolerance(
-    scene: Scene, compute: Callable[[Setting], R], comm: MPI.Comm, resumed: Setting | None = None
-) -> R:
-    """Return the result of the cheapest theory whose own error is within the model.tolerance of a scene.
-
-    The theory that the scene names is the richest; mesh and steps are those of the scene. Where that theory misses the
-    tolerance, too, model.on_exceed says what happens.
-
-    Args:
-        scene: with a model.tolerance.
-        compute: setting ↦ its result, with a `theory_error` in its summary where that is known.
-        comm: of the processes.
-        resumed: setting of a run that goes on.
-
-    Raises:
-        Missed: no theory is within the tolerance and model.on_exceed = "stop"; its attribute `result` holds the best.
-        ComputationError: the richest theory failed.
-    """
-    tolerance, own, linear = scene.model.tolerance, scene.model.theory, linear_of(scene)
-    assert tolerance is not None
-    names = [own] if linear is None or linear.name == own else [linear.name, own]
-    first = resumed or Setting(tuple({"theory": name} for name in names), None, degree_of(scene))
-    found, started = Refinement[R](), perf_counter()
-
-    def answer(setting: Setting) -> tuple[R, dict[str, Any]]:
-        done = compute(setting)
-        error = done.summary.get("theory_error", {}).get("estimate")
-        return done, {"model": error, "total": error}
-
-    refine(first, answer, tolerance, Clock(None, comm), found)
-    assert found.best is not None
-    error, summary = found.best.error["model"], found.best.result.summary
-    chosen, effects = found.best.setting.models[0]["theory"], summary["effects"]
-    upgrades = [
-        {"from": row["theory"], "to": chosen, "why": row.get("failed") or f"its error is {estimated(row['error'])}"}
-        for row in found.tried
-        if row["theory"] != chosen
-    ]
-    timings = with_choice(summary["timings"], started)
-    choice = {
-        "theory": chosen,
-        "effects": effects,
-        "estimated_error": None if error is None else SAFETY * error,
-        "tolerance": tolerance,
-        "dropped": [] if chosen == own else [{"kind": "theory", "name": f"{own} → {chosen}", "estimate": error}],
-        "full_model": {"theory": own, "effects": effects},
-        "seconds": timings["choice"],
-        **({"upgrades": upgrades} if upgrades else {}),
-    }
-    warnings = [*summary["warnings"], *(f"{row['from']} was given up: {row['why']}" for row in upgrades)]
-    met = is_within(found.best.error, tolerance)
-    what = f"model.tolerance = {tolerance:g} is not met: the error of {chosen} is {estimated(error)}"
-    warnings += [] if met else [what]
-    done = found.best.result.with_summary(scene=scene.digest(), choice=choice, warnings=warnings, timings=timings)
-    if not met and scene.model.on_exceed == "stop":
-        raise failed(done, what, f"a larger model.tolerance, or a richer model.theory than {own}")
-    return done
-
-
-def estimated(error: float | None) -> str:
-    """Return an estimate in words."""
-    return "unknown" if error is None else f"estimated as {error:.2g}"
 
 
 def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Missed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,21 +12,19 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
-from rotfem.analysis.theory_error import RESOLVED, TheoryError, static_rotation
+from rotfem.analysis.theory_error import RESOLVED, TheoryError
 from rotfem.commands.first_state import Start
-from rotfem.commands.recorder import Monitor, accuracy_of
+from rotfem.commands.recorder import Monitor
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.companion import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS, Output, largest, of_columns, sizes, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
-from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -46,8 +44,6 @@ class RunErrors:
         wanted: whether errors are to be estimated.
         monitor: what has seen its states.
         shape: the equilibrium, a local dof array; None of a history.
-        reduced: a reduced model's history; None of others.
-        companions: of a march; None without them.
         stepper: of a march; None of others.
         start: returns what the history starts from in another system of the problem.
     """
@@ -58,8 +54,6 @@ class RunErrors:
     wanted: bool
     monitor: Monitor
     shape: Array | None
-    reduced: Response | None
-    companions: HistoryErrors | None
     stepper: Any
     start: Callable[[Any], Start]
 
@@ -85,20 +79,13 @@ class RunErrors:
         scale = largest(of_columns(of, self.history, self.system.structure))
         contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
-        if self.companions is not None:
-            contributions = self.companions.errors(scale)
-            found["time_at"] = self.companions.steps.difference[1]
-        elif self.reduced is not None or self.shape is not None:
-            time = 0.0 if self.reduced is None else self.reduced.time_error + self.reduced.basis_error
-            contributions = {"time": time, "space": self._of_mesh(OUTPUTS[of])}
+        if self.shape is not None:
+            contributions = {"time": 0.0, "space": self._of_mesh(OUTPUTS[of])}
         return ErrorEstimate({**contributions, "model": None if self.theory is None else self.theory.estimate}, found)
 
     @cached_property
     def theory(self) -> TheoryError | None:
         """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
-        if self.reduced is not None and self.reduced.foreshortening is not None:
-            basis = "the foreshortening by bending that it neglects, computed afterwards, is that large"
-            return TheoryError(self.reduced.foreshortening, basis, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
         names = self.system.structure.components
@@ -106,7 +93,7 @@ class RunErrors:
         in_balance = self.scene.time is not None and self.scene.initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self._drifting(self.monitor.farthest.error(self.system, tips, in_balance))
+            return self.monitor.farthest.error(self.system, tips, in_balance)
         try:
             found = self._apart(richer) if self.wanted else None
         except (ComputationError, InputError):
@@ -126,25 +113,6 @@ class RunErrors:
         own = {f"tip_{name}": d / size for name, d, size, known in each if known}
         return base.of_poorer(self.problem.theory, apart, own)
 
-    def _drifting(self, found: TheoryError | None) -> TheoryError | None:
-        """Return the error of a linear theory with that of the phase of a vibration that nothing drives."""
-        own = self.system
-        free = self.scene.time is not None and own.hub is None and own.linear and own.model.closed
-        if found is None or not (free and self.wanted):
-            return found
-        system = own.twin()
-        start = self.start(system)
-        q, v = (system.zeros() if x is None else x for x in (start.q, start.v))
-        try:
-            off = phase_drift(self.problem, system, (q, v), self.history["t"][-1], Newton.of(self.scene.solver))
-        except (ComputationError, InputError):
-            off = None
-        if off is None:
-            return None
-        part = _relative(off, self._scale)
-        basis = "its frequencies and strains compared with the exact ones"
-        return replace(found, estimate=found.estimate + part, basis=basis) if part > 0.0 else found
-
     def _apart(self, richer: Problem) -> tuple[Any, float, Array] | None:
         """Return the system of a richer theory, how far its tip is from the run's, relative, and by components, m.
 
@@ -154,33 +122,21 @@ class RunErrors:
             ComputationError: there is no answer in that theory.
             InputError: it cannot have what the problem has.
         """
-        if self.companions is not None:
-            self.companions.steps.finish()
-            companion = self.companions.theory
-            if companion is None or not companion.sound or not self.companions.steps.sound:
-                return None
-            apart = _relative(companion.difference[0], self._scale)
-            return companion.system, apart, np.array(companion.components)
-        if self.reduced is None and self.shape is None:
+        if self.shape is None:
             return None
-        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
+        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=False)
         own, there = self._answer(self.system), self._answer(system)
-        scale = largest(own) if self.shape is None else min(largest(own), largest(there))
+        scale = min(largest(own), largest(there))
         return system, _relative(largest(there - own), scale), np.abs(there - own).max(axis=0)
 
     def _answer(self, system: Any, output: Output = tip) -> Array:
-        """Return an output (n, components) of a reduced model or an equilibrium in the run's system or another one.
+        """Return an output (1, components) of the equilibrium in the run's system or another one.
 
         Raises:
             ComputationError: there is none.
         """
-        own, same = self.reduced, system is self.system
-        if own is not None:
-            accuracy, bent = accuracy_of(self.scene), own.manifold is not None
-            there = own if same else reduced_response(system, own.times, self.start(system).q, accuracy, bent)
-            return np.asarray(there.tips * system.structure.lever)
         solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
-        if same and self.shape is not None:
+        if system is self.system and self.shape is not None:
             q = self.shape.copy()
         else:
             q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
@@ -188,9 +144,7 @@ class RunErrors:
 
     def _of_mesh(self, output: Output) -> float | None:
         """Return the error of an output by the mesh: its difference to the one on another mesh; None if unknown."""
-        own, other = self._answer(self.system, output), on_other_mesh(self.problem, self.system, self.shape is None)
-        if self.reduced is not None and not np.any(own):
-            return 0.0  # nothing moves it, on no mesh
+        own, other = self._answer(self.system, output), on_other_mesh(self.problem, self.system, moving=False)
         if other is None:
             return None
         try:
@@ -214,7 +168,7 @@ class RunErrors:
         if unknown:
             why = self._why_unknown(error)
             said = [f"the error by the {' and the '.join(unknown)} could not be estimated: {why}"]
-        allowed = max(NOTICED, scene.model.tolerance or 0.0, (time and time.tolerance) or 0.0)
+        allowed = max(NOTICED, (time and time.tolerance) or 0.0)
         if error.total is None or error.total <= allowed:
             return said
         steps, mesh, model = sizes = [error.contributions[name] or 0.0 for name in NAMES]
@@ -240,10 +194,8 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        if self.companions is not None and error.contributions["time"] is None:
-            if self.companions.steps.sound:
-                return "the prescribed motion or loads allow no steps of twice the length"
-            return "a run with steps of twice the length failed, so these are hardly short enough"
+        if error.contributions["time"] is None:
+            return "errors of histories are not estimated"
         if error.contributions["space"] is None:
             return "there is no other mesh to compare with, or the run failed on it"
         return "the run failed with a more exact theory"
@@ -262,24 +214,10 @@ def _relative(apart: float, scale: float) -> float:
     return apart / scale if scale > 0.0 else 1.0
 
 
-def check_rotations(scene: Scene, system: Any) -> None:
-    """Refuse a linear model of motions whose rotations θ are too large: with foreshortening it errs by about θ²/2.
-
-    The rotations are those of the static shape under what acts in the frame. Of a free hub nothing is known
-    before its motion.
-
-    Args:
-        scene: with an accuracy.
-        system: of the linear theory.
-
-    Raises:
-        ComputationError: an answer of it would not be within the accuracy.
-    """
-    if scene.time is None or scene.accuracy is None or system.hub is not None:
-        return
-    rotation = static_rotation(system, scene.time.end)
-    if rotation**2 / 2 > scene.accuracy:
-        raise ComputationError(f"rotations of about {rotation:.2g} are too large for {scene.model.theory}")
+def richer_problem(problem: Problem) -> Problem | None:
+    """Return a problem in the richer theory that it is compared with; None where there is none."""
+    richer = compared(problem.theory, problem.structure.type)
+    return None if richer is None else problem.replace(theory=richer)
 
 
 def output_of(scene: Scene) -> str:

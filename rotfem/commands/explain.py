@@ -172,7 +172,7 @@ def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress
         progress: called with the share of the rows that are done.
     """
     increment = min(1e-10, scene.solver.increment_tolerance)  # small differences are wanted
-    exact = {"model.frame": "rotating", "model.tolerance": None, "solver.increment_tolerance": increment}
+    exact = {"model.frame": "rotating", "solver.increment_tolerance": increment}
     scene = scene.replace({**exact, "model.effects": list(of.own), "output.error": False})
     own, own_notes = full_outputs(scene, of)
     for i, item in enumerate(changes, start=1):

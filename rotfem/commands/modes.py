@@ -18,9 +18,9 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryError, error_under_load
-from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.advice import advise, frozen_inputs
-from rotfem.commands.error_report import error_of_modes
+from rotfem.commands.error_report import error_of_modes, richer_problem
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, modal_summary
@@ -30,7 +30,6 @@ from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.companion import richer_problem
 from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
@@ -82,7 +81,7 @@ def modes(
 
 
 def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
-    """Return what a command computes of the modes of a scene, to its accuracy or tolerance if it has one.
+    """Return what a command computes of the modes of a scene, to its accuracy if it has one.
 
     Args:
         scene: as it was given.
@@ -100,8 +99,6 @@ def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, comman
 
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
-        if scene.model.tolerance is not None:
-            return within_tolerance(scene, attempt, comm)
         if scene.accuracy is None:
             return compute(scene)
         refuse(scene, ("frequencies",), command)

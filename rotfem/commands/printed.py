@@ -41,18 +41,14 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     ]
     if "left_out" in s:
         lines.append(f"not computed, as nothing excites it: {', '.join(s['left_out']['unknowns'])}")
-    lines += choice_report(s)
+    lines += accuracy_report(s)
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []
-    time, model = s["timings"], s.get("reduced")
+    time = s["timings"]
     took = f"{time['total']:.2f} s: compilation {time['compile']:.2f} s"
-    if model is None:
-        how = f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {took}"
-        return [*lines, f"{how}, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"], []
-    how = f"reduced model of {model['vectors']} shapes, {model['steps']} time steps, {took}"
-    errors = f"shapes {percent(model['projection_error'])}, time steps {percent(model['time_error'])}"
-    return [*lines, f"{how}, reduction {time['reduce']:.2f} s; its error: {errors}"], []
+    how = f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {took}"
+    return [*lines, f"{how}, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"], []
 
 
 def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -61,7 +57,7 @@ def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
         f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds ({s['speeds_solved']} solved to follow the modes), "
         f"{s['dofs']} unknowns, in {s['timings']['total']:.2f} s"
     )
-    return [line, *choice_report(s)], []
+    return [line, *accuracy_report(s)], []
 
 
 def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -75,7 +71,7 @@ def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `explain` prints before and after its tables."""
     absent = ", ".join(f"{name} ({why})" for name, why in s["absent_effects"].items())
-    after = [*choice_report(s), *([f"effects without data: {absent}"] if absent else [])]
+    after = [*accuracy_report(s), *([f"effects without data: {absent}"] if absent else [])]
     return [f"{s['name']}: {s['theory']} theory, in {s['timings']['total']:.2f} s", effects(s)], after
 
 
@@ -91,7 +87,7 @@ def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 _AROUND = {
     "run": of_run,
     "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
-    "modes": lambda s: ([about(s), effects(s), *choice_report(s)], []),
+    "modes": lambda s: ([about(s), effects(s), *accuracy_report(s)], []),
     "campbell": of_campbell,
     "response": of_response,
     "explain": of_explain,
@@ -123,15 +119,3 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
     tries = len(wanted["attempts"])
     attempts = "" if tries == 1 else f" after {tries} attempts"
     return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {Setting.of(wanted['chosen']).words()}"]
-
-
-def choice_report(summary: dict[str, Any]) -> list[str]:
-    """Return the line that says which model was chosen, if one was."""
-    choice = summary.get("choice")
-    if choice is None:
-        return accuracy_report(summary)
-    dropped = ", ".join(row["name"] for row in choice["dropped"]) or "none"
-    error = f"estimated error {percent(choice['estimated_error'])} of {percent(choice['tolerance'])} allowed"
-    return [
-        f"model chosen in {choice['seconds']:.2f} s: {choice['theory']} theory; effects left out: {dropped}; {error}"
-    ]

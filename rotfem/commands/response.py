@@ -248,8 +248,8 @@ def result_of(
     usual = float(np.median(off))
     warnings += remarks(modes, undamped, usual, scene.modes.count)
     warnings += [
-        f"{name} = {value:g} is not pursued: a frequency response is of the scene's own model and mesh"
-        for name, value in (("accuracy", scene.accuracy), ("model.tolerance", scene.model.tolerance))
+        f"accuracy = {value:g} is not pursued: a frequency response is of the scene's own model and mesh"
+        for value in [scene.accuracy]
         if value is not None
     ]
     summary = {

@@ -18,19 +18,18 @@ from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import SMOOTHER, March, Steps, switches_of
-from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import said_of
-from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.error_report import RunErrors, check_rotations, output_of
+from rotfem.commands.error_report import RunErrors
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
-from rotfem.commands.recorder import Log, Monitor, Recorder, reduced_history
+from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
@@ -39,8 +38,6 @@ from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.companion import HistoryErrors, richer_problem
-from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
@@ -75,24 +72,20 @@ class Simulation:
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         check_rotating(problem, "a run")
-        by_basis = scene.time is not None and bool(scene.model.reduced)
-        if scene.time is not None and not (by_basis or scene.model.all_unknowns or scene.initial.first is not None):
+        if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
         self.system: Any = compile_system(problem, there, moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
-        critical = None if by_basis else critical_speed(self.system)
-        self.monitor = Monitor(self.system, critical)
+        self.monitor = Monitor(self.system, critical_speed(self.system))
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
-        #: What the states came from: of a march its stepper, companions and rows between steps; or a reduced model.
+        #: What the states came from: of a march its stepper and rows between steps.
         self.stepper: Stepper | None = None
-        self.companions: HistoryErrors | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
-        self.reduced: Response | None = None
         self.shape: Array | None = None
 
     def run(self, progress: Progress | None = None) -> RunResult:
@@ -110,8 +103,7 @@ class Simulation:
                 self.start = Start() if self.store.goes_on else self._start(self.system)
                 self.monitor.stability = self.start.stability
                 self.log.warnings += self.start.warnings
-                if not (self.scene.model.reduced and self._by_reduced_model(progress)):
-                    self._march(self.scene.time, progress)
+                self._march(self.scene.time, progress)
         except ComputationError as error:
             failure = self._with_cause(error)
             failure.result = self.result("failed", failure)
@@ -141,28 +133,11 @@ class Simulation:
                 )
             log.warnings.append(said)
 
-    def _by_reduced_model(self, progress: Progress) -> bool:
-        """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
-        self.store.start(self._memory())
-        with self.store.interrupts():
-            self.reduced = reduced_history(
-                self.scene, self.system, self.start.q, self.record, self.monitor, self.log, self.setting is not None
-            )
-        if self.reduced is None:
-            self.monitor.critical = critical_speed(self.system)
-            return False
-        progress(1.0)
-        return True
-
     def _march(self, time: Time, progress: Progress) -> None:
         """March through the history."""
         scheme, newton = scheme_of(time), self.iteration
         march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
         self.stepper = march.stepper
-        if self._wants_error:
-            of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
-            self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
-            self.stepper.observers.append(self.companions)
         march.reached = self.store.start(self._memory())
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
@@ -178,13 +153,6 @@ class Simulation:
         there = system.model.problem
         problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
         return first_state(self.scene, problem, system, judged=system is self.system)
-
-    def _start_there(self, system: Any) -> tuple[Array | None, Array | None]:
-        """Return the shape and the velocities that a companion starts from."""
-        nodes = [s.V.dofmap.index_map.size_global for s in (system, self.system)]
-        same = nodes[0] == nodes[1] and system.model.problem.theory == self.problem.theory
-        start = self.start if self.store.goes_on or same else self._start(system)
-        return start.q, start.v
 
     # --- what sees them ---------------------------------------------------------------------------------------------
 
@@ -214,11 +182,7 @@ class Simulation:
     def _memory(self) -> Memory:
         """Return what a checkpoint holds."""
         assert self.scene.time is not None
-        companions = [] if self.companions is None else self.companions.companions
-        return Memory(
-            *(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log),
-            *(companions, self.setting),
-        )
+        return Memory(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log, self.setting)
 
     # --- the result -------------------------------------------------------------------------------------------------
 
@@ -236,7 +200,7 @@ class Simulation:
             )
         errors = RunErrors(
             *(self.scene, self.system, history, self._wants_error, watched),
-            *(self.shape, self.reduced, self.companions, self.stepper, self._start),
+            *(self.shape, self.stepper, self._start),
         )
         theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
         log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
@@ -246,7 +210,6 @@ class Simulation:
             name: part.summary()
             for name, part in (
                 ("stress", self.record.resultants),
-                ("reduced", self.reduced),
                 ("error", error),
                 ("theory_error", theory),
                 ("stability", watched.stability),
@@ -278,8 +241,6 @@ class Simulation:
         scene, system, log, stepper = self.scene, self.system, self.log, self.stepper
         space, mesh = system.V.dofmap, system.structure.mesh
         parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
-        if self.reduced is not None:
-            parts["reduce"] = self.reduced.seconds["wall"]
         before = {"before": log.elapsed} if log.resumed else {}
         out = {
             **summary("run", scene, self.comm, system.comm),
@@ -376,10 +337,10 @@ def simulate(
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
 
     Raises:
-        Missed: its accuracy, or its model.tolerance with model.on_exceed = "stop", was not met.
+        Missed: its accuracy was not met.
         ComputationError: the richest model failed.
     """
-    comm, clock = store.comm, Clock(scene.accuracy_budget, store.comm, hint)
+    clock = Clock(scene.accuracy_budget, store.comm, hint)
     scene.check_run()
     store.open(scene, terms or {}, outputs or {})
 
@@ -390,8 +351,6 @@ def simulate(
         if scene.accuracy is None:
             also, critical = hints_of_start(variant, simulation.problem), simulation.monitor.critical
             simulation.log.advice = advise(variant, hint, critical=critical, also=also)
-        elif setting is not None and setting.reduced:
-            check_rotations(variant, simulation.system)
         return simulation.run(progress)
 
     with input_of(scene.file):
@@ -400,6 +359,4 @@ def simulate(
         if scene.accuracy is not None:
             refuse(scene, ("tip", ROOT_MOMENT), "run")
             return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
-        if scene.model.tolerance is not None:
-            return within_tolerance(scene, compute, comm, store.setting())
         return compute()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +25,6 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import OutputError, SceneError, Stopped
-from rotfem.refinement.companion import Companion
 from rotfem.refinement.refine import Setting
 from rotfem.results.checkpoint_file import read_checkpoint, write_checkpoint
 from rotfem.results.files import CHECKPOINT
@@ -45,8 +44,6 @@ APART = {
     "StationRows": ("output", "names", "_stations", "_columns"),
     "ResultantRows": ("names", "frames", "_resultants", "_nodes", "_columns", "_stress"),
     "Stepper": _STEPPER,
-    "CompanionStepper": _STEPPER,
-    "Companion": ("system", "followed", "output", "interval", "stepper", "further", "_step"),
 }
 
 
@@ -107,7 +104,6 @@ class Memory:
     record: Recorder
     monitor: Monitor
     log: Log
-    companions: Sequence[Companion]
     setting: Setting | None
 
     @property
@@ -119,7 +115,7 @@ class Memory:
     @property
     def _own(self) -> list[Any]:
         """Objects that have arrays of a rank."""
-        return [self.monitor, self.monitor.farthest, self.record.snapshots, *self.companions]
+        return [self.monitor, self.monitor.farthest, self.record.snapshots]
 
     def taken(self, state: State, mine: Tree) -> Tree:
         """Return what the run knows at a state, on rank 0.
@@ -135,7 +131,6 @@ class Memory:
             "state": state.changed(inner=()),
             "stepper": of_stepper(self.stepper),
             "parts": [known(part) for part in self._own],
-            "companions": [of_stepper(companion.stepper) for companion in self.companions],
         }
         return {
             "identity": mine,
@@ -174,9 +169,6 @@ class Memory:
             self.record.history.append(row)
         put_back_stepper(self.stepper, own["stepper"], state)
         self.system.held.factored_before = tree["factorisations"] - self.system.held.factorisations
-        for companion, learnt in zip(self.companions, own["companions"], strict=True):
-            if companion.state is not None:
-                put_back_stepper(companion.stepper, learnt, companion.state)
         return state
 
 
@@ -290,8 +282,6 @@ class RunStore:
         option = "--resume" if self.resume else "--checkpoint"
         if scene.time is None:
             raise SceneError("command line", option, None, "needs a scene with [time]; a steady state has no steps")
-        if scene.model.reduced:
-            raise SceneError("command line", option, None, "has no meaning with model.reduced, which takes no steps")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
         self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
@@ -315,7 +305,7 @@ class RunStore:
         return summary if is_done and comparable(summary.get("scene")) == comparable(scene.digest()) else None
 
     def setting(self) -> Setting | None:
-        """Return the setting of the run that goes on, which an accuracy or a tolerance has led to; None without."""
+        """Return the setting of the run that goes on, which an accuracy has led to; None without."""
         if self._tree is None or self._tree["settings"] is None:
             return None
         return Setting(**self._tree["settings"])

@@ -26,7 +26,7 @@ from rotfem.equations.clamp import AtClamp
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import assembled
 from rotfem.mechanics.effects import INTERNAL
-from rotfem.mechanics.theories import Theory, richest
+from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
@@ -56,18 +56,6 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
             curvature = ufl.derivative(ufl.derivative(higher.value, q, u), q, w)
             out += ufl.inner(force, forms.without(curvature, q)) * higher.measure
     return 0 if isinstance(out, int) or expand_derivatives(out).empty() else out
-
-
-def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -> Any:
-    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with the exact strains Γ and the forces N of a linear theory."""
-    s, out = model.structure, 0
-    q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
-    for strain in model.mechanics.strains:
-        force = strain.force(ufl.replace(strain.value, {q: test}))
-        at_rest = forms.first_branches(exact[strain.name])  # at rest the other branches of its rotations divide by zero
-        second = ufl.derivative(ufl.derivative(at_rest, q, displacements[0]), q, displacements[1])
-        out += ufl.inner(force, forms.without(second, q)) * strain.measure
-    return out
 
 
 def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Piece, Any, frozenset[str]]]:

@@ -31,7 +31,7 @@ class Theory:
         exact: whether displacements and rotations may be of any size.
         prestress: for a linear theory, second-order strains by structure type, of its geometric stiffness under the
             forces of the spinning linear structure; empty for none.
-        poorer: cheaper theories of its own family, cheapest first, which `model.tolerance` may take instead.
+        poorer: cheaper theories of its own family, cheapest first, which an accuracy may take instead.
         quick: whether a quick study of cost tries it.
     """
 

@@ -1,8 +1,8 @@
 """The change of an answer by every effect and every theory: models that differ in one of them, against the scene's own.
 
-A history is marched once, with the companions for its error (`rotfem.refinement.companion`). Then the own model is
-marched on half the cells in steps as long as that error allows, followed by one companion for every model that differs
-by one effect or by the theory. Both have the same mesh and steps, so their distance is the change by the model,
+A history is marched once as it is, in steps of twice the length and on half the cells, for its error. Then the own
+model, and every model that differs by one effect or by the theory, is marched on half the cells in steps as long as
+that error allows. Both have the same mesh and steps, so their distance is the change by the model,
 
     max_t |u_model − u_own| / max_t |u_own|,    max_i |λ_model,i − λ_own,i| / |λ_own,i|,
 
@@ -33,12 +33,17 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import theories
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import OtherMesh, on_other_mesh
-from rotfem.refinement.companion import CERTAIN, Companion, HistoryErrors, Start
-from rotfem.refinement.distance import distance, distance_each, largest, tip
+from rotfem.refinement.distance import distance, distance_each, tip
 from rotfem.refinement.estimate import ASYMPTOTIC, error_of
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
+
+#: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.
+Start = Callable[[Any], tuple[Array | None, Array | None]]
+
+#: Order up to which a scheme's order holds for all motions (Hairer & Wanner 1996, section IV.15).
+CERTAIN = 2
 
 #: Names of the outputs that models are compared by.
 HISTORY, STEADY, MODES = "history", "steady", "modes"
@@ -311,21 +316,32 @@ class Explanation:
     # --- a history ----------------------------------------------------------------------------------------------------
 
     def _history(self) -> OtherMesh | None:
-        """March the own model with its companions, then the changes; return the problem on another mesh."""
-        case = self.case
+        """March the own model, in longer steps and on another mesh, then the changes; return that mesh."""
+        other = on_other_mesh(self.problem, self.system)
         try:
-            errors = HistoryErrors(self.problem, self.system, self._scheme, case.newton(), case.start)
-            own = self._marched(self.system, self._time, [errors.steps])
+            own = self._marched(self.system, self._time)
         except ComputationError as error:
             self._fails(HISTORY, error.what)
-            return on_other_mesh(self.problem, self.system)
-        known = errors.errors(self.scale)
-        self.mesh.estimate[HISTORY], self.steps.estimate[HISTORY] = known["space"], known["time"]
-        system, mesh, other = self.system, errors.mesh, errors.other
-        if mesh and other and other.ratio > 1.0 and mesh.sound and mesh.difference[0] <= ASYMPTOTIC * self.scale:
+            return other
+        system, of_steps = self.system, self._apart(own, self.system, self._steps(2.0))
+        of_mesh = None if other is None else self._apart(own, other.system, self._time)
+        known = None if of_steps is None else error_of(of_steps, min(self._scheme.order, CERTAIN))
+        self.steps.estimate[HISTORY] = known
+        self.mesh.estimate[HISTORY] = None if other is None or of_mesh is None else other.error(of_mesh)
+        if other is not None and other.ratio > 1.0 and of_mesh is not None and of_mesh <= ASYMPTOTIC:
             system = other.system
-        self._refine(system, own, known["time"])
+        self._refine(system, own, known)
         return other
+
+    def _apart(self, own: History, system: Any, steps: Steps) -> float | None:
+        """Return how far the history of a system is from the own one, relative; None if it fails."""
+        size, scale = self.size, self.scale
+        try:
+            return own.distance(self._marched(system, steps))
+        except ComputationError:
+            return None
+        finally:
+            self.size, self.scale = size, scale
 
     def _refine(self, system: Any, own: History, error: float | None) -> None:
         """Compute the changes in steps as long as the error allows, and those not known again in halved steps.
@@ -366,12 +382,10 @@ class Explanation:
             changed = {"tolerance": min(steps.tolerance * ratio**self._scheme.order, ASYMPTOTIC)}
         return Steps(**(vars(steps) | changed))
 
-    def _marched(self, system: Any, steps: Steps, companions: Sequence[Companion]) -> History:
-        """Return the history of the own model, followed by companions."""
+    def _marched(self, system: Any, steps: Steps) -> History:
+        """Return the history of a system."""
         case, times, tips = self.case, list[float](), list[Array]()
-        march = March(system, self._scheme, steps, case.newton(), *case.start(system))
-        march.stepper.observers = list(companions)
-        for state in march:
+        for state in March(system, self._scheme, steps, case.newton(), *case.start(system)):
             size = float(system.size(state.q))
             tips.append(tip(system, state))
             if system is self.system:  # at every step, for marches that fail
@@ -379,52 +393,29 @@ class Explanation:
             if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
                 raise ComputationError(f"it diverges at t = {state.t:.4g} s")
             times.append(state.t)
-        for companion in companions:
-            companion.finish()
         return History(np.array(times), np.array(tips))
 
     def _changed(self, system: Any, ratio: float, changes: Sequence[Change]) -> tuple[History, dict[str, float | None]]:
-        """Return the history of the own model in steps of another length, and name ↦ size of changes; None of unknown.
+        """Return the history of the own model in steps of another length, and name ↦ size of changes.
 
         Args:
             system: of the own model.
             ratio: of the steps to the case's own.
             changes: those that are wanted.
         """
-        others = self._following(system, changes)
-        history = self._marched(system, self._steps(ratio), [other for other in others if other is not None])
-        scale, out = largest(history.tips), dict[str, float | None]()
-        for change, other in zip(changes, others, strict=True):
+        known, steps = (self.size, self.scale), self._steps(ratio)
+        history, out = self._marched(system, steps), dict[str, float | None]()
+        for change, other in zip(changes, self._variants(system, changes), strict=True):
+            out[change.name] = np.inf
             if other is None:
-                out[change.name] = np.inf
                 continue
-            size, at = other.difference
             change.notes.pop(HISTORY, None)
-            if size > other.limit:
-                change.notes[HISTORY], out[change.name] = f"it diverges at t = {at:.4g} s", np.inf
-            elif not other.sound and size < LARGE * scale:
-                out[change.name] = None
-            else:
-                out[change.name] = 0.0 if size == 0.0 else float(size / scale) if scale > 0.0 else np.inf
-        return history, out
-
-    def _following(self, own: Any, changes: Sequence[Change]) -> list[Companion | None]:
-        """Return companions of changes that follow the own model; None of a theory without all terms."""
-        out: list[Companion | None] = []
-        for system in self._variants(own, changes):
-            if system is None:
-                out.append(None)
-                continue
-            companion = Companion(system, own, self._scheme, self.case.newton(), doubles=False)
-            # each of two tips is displaced by twice the length at most, and a change is shown with two digits
-            longest = LARGEST_LINEAR_DEFLECTION if system.linear else 4.0
-            companion.limit, companion.part = longest * system.structure.length, 1e-2
             try:
-                companion.begin(*self.case.start(system))
-            except ComputationError:
-                companion.sound = False
-            out.append(companion)
-        return out
+                out[change.name] = history.distance(self._marched(other, steps))
+            except ComputationError as error:
+                change.notes[HISTORY] = error.what
+        self.size, self.scale = known
+        return history, out
 
     # --- steady state and modes ---------------------------------------------------------------------------------------
 

@@ -3,15 +3,6 @@
 The error by the mesh is that of the difference to the same mode on half the cells (`rotfem.refinement.coarser`), the
 error by the theory the difference itself. Modes are matched by their shapes in x^H M x; of several similar shapes, as
 those of the two whirls of a shaft above its critical speed, the nearest eigenvalue is taken.
-
-The stress stiffness of a linear theory is that of the undeformed structure, so its eigenvalues λ are in error by dλ. A
-start with q₀ and v₀, relative to the equilibrium, has the part c x of a mode with right and left vectors x and y,
-
-    c = yᴴ[(λM + C)q₀ + Mv₀] / yᴴ(2λM + C)x
-
-(Tisseur & Meerbergen, SIAM Review 43 (2001) 235, section 3). After the time T, or where damping −Re λ ends the
-vibration sooner, it is out of phase by |dλ| T. This holds for free vibrations; excited ones have the phase of the
-excitation.
 """
 
 from __future__ import annotations
@@ -22,12 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.frequency_response import tip_output
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.theories import richest
 from rotfem.numerics.linear import SMALL
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed, with_ghosts
@@ -144,37 +132,3 @@ class FrequencyErrors:
             # as much alike are shapes within 25 degrees of the mode
             apart[alike < 0.9 * np.max(alike, axis=1, keepdims=True)] = np.inf
         return np.asarray(self.resolved[np.argmin(apart, axis=1)])
-
-
-def phase_drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float, newton: Newton) -> float | None:
-    """Return the error of the tip by the phase error of a linear theory, m; None where it is unknown.
-
-    Args:
-        problem: of a linear theory, at constant speed and without excitation.
-        system: equations of motion, the hub held; its state and time are set.
-        start: q and v at t = 0, local dof arrays.
-        time: that passes, s.
-        newton: iteration control.
-
-    Raises:
-        ComputationError: there is no equilibrium, or no mode.
-    """
-    speed, (q, v) = float(problem.motion.speed(0.0)), start
-    rest = steady_state(system, speed, newton)
-    if not np.any(rest) or not (np.any(q - rest) or np.any(v)):
-        return 0.0
-    analysis = ModalAnalysis(problem.replace(outputs={}), newton=newton, comm=system.comm, system=system)
-    spinning = analysis.at(speed, 8)  # a free vibration from a smooth start has little of higher modes
-    pairs, pencil = spinning.pairs, spinning.pencil
-    errors = FrequencyErrors(analysis, problem.replace(theory=richest()))(spinning)
-    if None in errors:
-        return None
-    lam, (away, rate) = pairs.values, ((x[: len(pairs.right), None]).astype(complex) for x in (q - rest, v))
-    moved = summed(system.comm, pairs.left.conj().T @ pencil.apply(pencil.M, rate))
-    part = (pencil.gram(pairs.left, lam, away, np.zeros(1)) + moved)[:, 0] / np.diag(spinning.own)
-    change = np.array(errors, dtype=float) * sizes(pairs.resolved)
-    lasting = np.minimum(time, 1.0 / np.maximum(-lam.real, 1.0 / time))
-    out = np.abs(part) * np.minimum(change * lasting, 2.0)  # which is out of phase
-    tip = tip_output(system).read
-    lengths = [np.linalg.norm(tip(x, 0.0) * system.structure.lever) for x in pairs.right.T]
-    return float(np.sum(out * lengths, where=lam.imag > 0.0) * 2.0)  # with the conjugate pairs

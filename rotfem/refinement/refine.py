@@ -80,11 +80,6 @@ class Setting:
         return self.scheme is not None
 
     @property
-    def reduced(self) -> bool:
-        """Whether the model in use is a reduced one."""
-        return bool(self.models[0].get("reduced"))
-
-    @property
     def theory(self) -> str:
         """Name of the theory in use."""
         return str(self.models[0]["theory"])
@@ -102,16 +97,21 @@ class Setting:
 
     def summary(self) -> dict[str, Any]:
         """Return the keys of the setting that are in use."""
-        unused = {"models", "scheme", "tolerance"} if self.reduced else {"models"}
-        used = {**self.models[0], **{key: value for key, value in asdict(self).items() if key not in unused}}
+        used = {**self.models[0], **{key: value for key, value in asdict(self).items() if key != "models"}}
         return {key: value for key, value in used.items() if value is not None}
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Self:
         """Return the setting of a row or a summary, with its model alone."""
-        model = {name: row[name] for name in ("theory", "reduced") if row.get(name)}
         elements = tuple(row["elements"]) if isinstance(row.get("elements"), list) else row.get("elements")
-        return cls((model,), elements, row["degree"], row.get("scheme"), row.get("tolerance"), row.get("step"))
+        return cls(
+            ({"theory": row["theory"]},),
+            elements,
+            row["degree"],
+            row.get("scheme"),
+            row.get("tolerance"),
+            row.get("step"),
+        )
 
     def key(self) -> str:
         """Return an identifier of the setting: all of it as JSON."""
@@ -120,13 +120,13 @@ class Setting:
     def words(self) -> str:
         """Return it in words."""
         steps, cells = "", f", degree {self.degree}"
-        if self.moving and not self.reduced:
+        if self.moving:
             length = f"to {self.tolerance:.2g}" if self.step is None else f"of {self.step:.3g} s"
             steps = f", steps {length} by {self.scheme}"
         if self.elements is not None:
             number = "×".join(map(str, self.elements if isinstance(self.elements, tuple) else [self.elements]))
             cells = f", {number} elements of degree {self.degree}"
-        return f"{self.theory}{', reduced' if self.reduced else ''}{steps}{cells}"
+        return f"{self.theory}{steps}{cells}"
 
     def richer(self) -> Self | None:
         """Return this setting with the next richer model; None if this is the richest."""

@@ -20,7 +20,7 @@ from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import apply_overrides, encodable, noted_files, read_toml, set_keys, to_builtin
 from rotfem.scene.loads import Loads, check_loads, check_tables
-from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
+from rotfem.scene.motion import AnyMotion, Motion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.structure import designed
 from rotfem.scene.table import SceneModel, Unit, problem, scene_error
@@ -352,9 +352,6 @@ def check_theory(structure: Any, model: Model) -> None:
         has = ", ".join(theory.strains) or "no structure"
         raise problem("model.theory", theory.name, f"has strains for {has}, none for a {kind}; allowed there: {able}")
     check_prestress(structure, model)
-    if model.reduced and not theory.linear:
-        able = ", ".join(show(other.name) for other in registry.theories if other.linear and other.holds_for(kind))
-        raise problem("model.reduced", model.reduced, f'needs a linear model.theory, not "{theory.name}": {able}')
 
 
 def check_prestress(structure: Any, model: Model) -> None:
@@ -369,15 +366,13 @@ def check_prestress(structure: Any, model: Model) -> None:
         raise problem("model.prestress", model.prestress, why)
     if kind == "plate":
         raise problem("model.prestress", model.prestress, "is for beams: that of a plate is of its membrane forces")
-    if not registry.theories[model.theory].prestress and model.tolerance is None:
+    if not registry.theories[model.theory].prestress:
         able = (show(theory.name) for theory in registry.theories if kind in theory.prestress)
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
 def check_frame(structure: Any, motion: Motion, model: Model) -> None:
-    """Refuse the inertial-frame form where there is none, and a controller where the motion is solved for at once."""
-    if model.reduced and isinstance(motion, TorqueMotion) and motion.function is not None:
-        raise problem("model.reduced", model.reduced, "needs a torque over time, not motion.function")
+    """Refuse the inertial-frame form where there is none."""
     if structure.pitches and motion.is_free:
         raise problem("structure.root.pitch", None, 'over time needs a speed that is prescribed, not type = "torque"')
     if model.frame != "inertial":
@@ -414,8 +409,6 @@ def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial
     if not initial.moves:
         return
     key, value = ("initial.mode", initial.mode) if initial.mode is not None else ("initial.velocity", None)
-    if model.reduced:
-        raise problem(key, value, "cannot be combined with model.reduced, which starts at rest")
     if model.frame == "inertial":
         raise problem(key, value, 'is relative to the turning frame: it needs model.frame = "rotating"')
 
@@ -452,8 +445,5 @@ def check_accuracy(scene: Scene) -> None:
             reason = "is what an accuracy may take, and needs accuracy"
             raise problem("accuracy_budget", scene.accuracy_budget, reason)
         return
-    if scene.model.tolerance is not None:
-        reason = "cannot be combined with accuracy, which allows the model a share of its own"
-        raise problem("model.tolerance", scene.model.tolerance, reason)
     if not scene.output.error:
         raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")

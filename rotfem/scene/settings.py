@@ -45,16 +45,14 @@ def _as_plate_elements(value: Any) -> tuple[int, int]:
     return nx, ny
 
 
-def _as_reduced(value: Any) -> bool | float:
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, int | float) and 0.0 < value < 1.0:
-        return float(value)
-    raise problem("", value, "must be true, false, or an accuracy between 0 and 1")
-
-
 Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
 Integration = Literal["reduced", "full"]
+
+
+_LADDER = 'it went with version 0.9; "accuracy" chooses theory, mesh and steps, "rotfem explain" compares theories'
+_REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
+#: Keys of [model] in earlier versions ↦ what takes their place.
+GONE = {"tolerance": _LADDER, "on_exceed": _LADDER, "reduced": _REDUCED, "foreshortening": _REDUCED}
 
 
 class Model(SceneModel):
@@ -66,11 +64,6 @@ class Model(SceneModel):
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
             "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".
-        tolerance: largest estimated error of a cheaper theory that is used instead, or None.
-        on_exceed: if the named theory misses the tolerance, too, "stop" ends with exit status 3; "upgrade" and "warn"
-            warn.
-        reduced: whether a history of a linear theory is computed by a reduced model; a number is its accuracy.
-        foreshortening: whether a reduced model includes foreshortening.
         all_unknowns: whether a history keeps unknowns that are zero by symmetry.
     """
 
@@ -78,21 +71,14 @@ class Model(SceneModel):
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     prestress: Literal["axial", "all"] | None = None
-    tolerance: Positive | None = None
-    on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
-    reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False
-    foreshortening: bool = False
     all_unknowns: bool = False
 
-    def _check(self) -> None:
-        if self.tolerance is not None and self.frame == "inertial":
-            raise problem("tolerance", self.tolerance, 'needs frame = "rotating", as the cheaper theories do')
-        if self.tolerance is not None and self.reduced:
-            raise problem("reduced", self.reduced, "cannot be combined with tolerance, which chooses the model")
-        if self.foreshortening and not self.reduced:
-            raise problem(
-                "foreshortening", True, "needs reduced = true: it is given back to the shapes of a reduced model"
-            )
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        for key, instead in GONE.items():
+            if key in data:
+                raise problem(key, None, f"unknown key; {instead}")
+        return data
 
 
 def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:

@@ -58,23 +58,11 @@ def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem)
     assert "by the full models" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
 
 
-def test_run_says_what_it_has_chosen(folder: Path, rotfem: Rotfem) -> None:
-    done = rotfem("run", "beam.toml", "--set", "model.tolerance=0.05", "--no-plots", "-o", "out")
-    assert done.status == 0, done.err
-    assert "chosen in" in done.out
-    assert "left out: reissner → consistent_linear" in done.out
-    choice = json.loads((folder / "out" / "summary.json").read_text())["choice"]
-    assert choice["theory"] == "consistent_linear"
-    assert choice["estimated_error"] <= choice["tolerance"] == 0.05
-    assert [row["name"] for row in choice["dropped"]] == ["reissner → consistent_linear"]
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (("explain", "missing.toml"), "missing.toml"),
         (("explain", "beam.toml", "--set", "model.on_exceed=no"), "model.on_exceed"),
-        (("run", "beam.toml", "--set", "model.tolerance=0.1", "--set", "accuracy=0.1"), "model.tolerance"),
         (("explain", "beam.toml", "-o", "beam.toml/out"), "beam.toml/out"),
     ],
 )

@@ -152,7 +152,7 @@ def test_report_of_a_spin_up(folder: Path, rotfem: Rotfem) -> None:
 
 
 def test_report_of_a_run_that_failed(folder: Path, rotfem: Rotfem) -> None:
-    options = ("--set", "model.theory=linear", "--set", "model.on_exceed=warn", "--no-error", "--no-plots", "-q")
+    options = ("--set", "model.theory=linear", "--no-error", "--no-plots", "-q")
     done = rotfem("run", str(DEMOS / "spin_up.toml"), "--set", "time.step=0.02", *options, "--report", "-o", "out")
     assert done.status == 3
     text = (folder / "out" / "report.html").read_text(encoding="utf-8")

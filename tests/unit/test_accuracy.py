@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rotfem.commands.accuracy import coarsened, models_of
+from rotfem.commands.accuracy import coarsened
 from rotfem.errors import SceneError
 from rotfem.refinement.refine import Setting
 from rotfem.scene import Scene
@@ -31,8 +31,6 @@ def test_scenes_ask_for_an_accuracy() -> None:
     for key, value in (("accuracy", 0.9), ("accuracy", 0), ("accuracy", "fine"), ("accuracy_of", "root")):
         with pytest.raises(SceneError, match=key):
             scene.replace({key: value})
-    with pytest.raises(SceneError, match="cannot be combined with accuracy"):
-        scene.replace({"model.tolerance": 1e-3})
 
 
 def test_a_plate_begins_with_few_cells_of_its_proportions() -> None:
@@ -41,13 +39,3 @@ def test_a_plate_begins_with_few_cells_of_its_proportions() -> None:
     assert coarsened((8, 40), 2) == (3, 12)
     assert coarsened((60, 1), 3) == (8, 1)
     assert coarsened((10, 2), 2) == (10, 2)
-
-
-def test_a_torque_by_a_controller_has_no_reduced_model() -> None:
-    """It depends on the motion, which a reduced model is not told: the first answer is by the scene's own theory."""
-    tables = {"structure": STRUCTURE, "accuracy": 1e-3, "time": {"end": 1.0, "step": 0.01}}
-    hub = {"type": "torque", "hub_inertia": 50.0}
-    controlled = {**tables, "motion": {**hub, "function": lambda t, psi, psi_dot, tip: 5.0 - psi_dot}}
-    given = {**tables, "motion": {**hub, "pulses": [[0.0, 0.5, 10.0]]}}
-    models = [models_of(Scene.from_dict(scene), moving=True) for scene in (controlled, given)]
-    assert [[bool(model["reduced"]) for model in each] for each in models] == [[False], [True, False]]

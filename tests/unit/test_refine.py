@@ -25,7 +25,7 @@ SCENE = Scene.from_dict(
         "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
     }
 )
-LINEAR, FULL = ({"theory": name, "reduced": False} for name in ("consistent_linear", "reissner"))
+LINEAR, FULL = ({"theory": name} for name in ("consistent_linear", "reissner"))
 SETTING = Setting((FULL,), 6, 3, "esdirk4", 1e-2)
 
 

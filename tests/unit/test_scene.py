@@ -355,7 +355,7 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"model__effects": ["corolis"]}, "model.effects", 'did you mean "coriolis"?'),
         ("planar", {"model__effects": ["euler", "euler"]}, "model.effects", "twice"),
         ("planar", {"model__effects": "all"}, "model.effects", '"auto" or a list'),
-        ("planar", {"model__tolerance": 0}, "model.tolerance", "greater than 0"),
+        ("planar", {"model__tolerance": 0.1}, "model.tolerance", "explain"),
         ("planar", {"accuracy": 1e-3, "output": {"error": False}}, "output.error", "cannot be combined with accuracy"),
         ("planar", {"model": {"frame": "inertial", "theory": "linear"}}, "model.frame", "reissner"),
         ("plate", {"model__frame": "inertial"}, "model.frame", "planar_beam"),
@@ -456,6 +456,12 @@ def test_message_shows_file_key_value_and_what_is_allowed() -> None:
     error = refused(structure__lenght=1.0)
     assert str(error).startswith(
         'test.toml: structure.lenght: unknown key; did you mean "length"? allowed: type, length'
+    )
+
+
+def test_a_key_that_went_says_so() -> None:
+    assert str(refused(model__reduced=True)).startswith(
+        "test.toml: model.reduced: unknown key; reduced models went with"
     )
 
 

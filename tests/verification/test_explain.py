@@ -1,4 +1,4 @@
-"""What explain says against closed forms, spectral solutions and runs; theories chosen by model.tolerance."""
+"""What explain says against closed forms, spectral solutions and runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rotfem.commands.printed import report
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics.eigenproblem import Pencil
@@ -508,68 +508,6 @@ def test_an_explanation_costs_no_more_than_two_and_a_half_runs(monkeypatch: pyte
     of_run, work = work, 0
     rotfem.explain(asked)
     assert 0 < work < 2.5 * of_run
-
-
-# --- model.tolerance ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("tolerance", "theory"), [(1e-1, "consistent_linear"), (1e-3, "reissner")])
-def test_a_chosen_theory_is_within_its_tolerance(tolerance: float, theory: str) -> None:
-    gentle = {"motion.speed": 1.0}
-    full = rotfem.run(scene(SPIN_UP, gentle))
-    result = rotfem.run(scene(SPIN_UP, gentle | {"model.tolerance": tolerance}))
-    choice = result.summary["choice"]
-    assert choice["theory"] == result.summary["theory"] == theory
-    assert distance(tip(full), tip(result)) <= choice["estimated_error"] <= tolerance
-    assert choice["effects"] == full.summary["effects"]
-    assert ("upgrades" in choice) == (theory == "reissner")
-    assert result.summary["scene"]["model"]["tolerance"] == tolerance
-
-
-def test_the_theory_of_a_scene_is_the_richest() -> None:
-    """On a motion of a fifth of its length; nothing richer may be taken, so on_exceed says what happens."""
-    bent = {"motion": {"type": "constant", "speed": 1.0}, "loads": {"tip_force": [0.0, 100.0]}, "model.tolerance": 1e-3}
-    asked = scene(SPIN_UP, {**bent, "model.theory": "consistent_linear"})
-    result = rotfem.run(asked)
-    assert result.summary["choice"]["full_model"]["theory"] == result.summary["theory"] == "consistent_linear"
-    assert [line for line in result.summary["warnings"] if "model.tolerance = 0.001 is not met" in line]
-    with pytest.raises(ComputationError, match="is not met") as caught:
-        rotfem.run(asked.replace({"model.on_exceed": "stop"}))
-    so_far = caught.value.result  # type: ignore[attr-defined]
-    assert so_far.summary["status"] == "failed"
-    assert np.array_equal(tip(so_far), tip(result))
-
-
-def test_modes_and_campbell_choose_too() -> None:
-    asked = scene(SPIN_UP, {"model.tolerance": 1e-3})
-    full, chosen = rotfem.modes(scene(SPIN_UP)), rotfem.modes(asked)
-    assert chosen.summary["choice"]["theory"] == "consistent_linear"
-    for a, b in zip(full.rows, chosen.rows, strict=True):
-        assert b["frequency"] == pytest.approx(a["frequency"], rel=1e-3)
-    speeds = [0.0, 2.0, 4.0]
-    diagram, reference = rotfem.campbell(asked, speeds), rotfem.campbell(scene(SPIN_UP), speeds)
-    assert diagram.summary["choice"]["theory"] == "consistent_linear"
-    for label, branch in reference.branches().items():
-        found = diagram.branches()[label]["frequency"]
-        assert found[-1] == pytest.approx(branch["frequency"][-1], rel=1e-3)
-
-
-def test_a_blow_of_four_milliseconds_does_not_cost_the_tolerance() -> None:
-    motion = {"type": "constant", "speed": 2.0}
-    blow = [[0, 0, 0], [1.501, 0, 0], [1.503, 0, 4000.0], [1.505, 0, 0], [9.0, 0, 0]]
-    changes = {"loads": {"tip_force": blow}, "motion": motion, "time": {"end": 2.0, "step": 0.001, "output_every": 10}}
-    full = rotfem.run(scene(SPIN_UP, changes | {"output.error": False}))
-    result = rotfem.run(scene(SPIN_UP, changes | {"model.tolerance": 1e-2}))
-    assert distance(tip(full), tip(result)) < 1e-2
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [({"model.frame": "inertial"}, 'needs frame = "rotating"'), ({"model.on_exceed": "ignore"}, "model.on_exceed")],
-)
-def test_a_tolerance_that_cannot_be_kept_is_refused(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError, match=message):
-        scene(SPIN_UP, {"model.tolerance": 1e-2} | changes)
 
 
 def test_a_history_in_a_plane_is_explained_with_the_modes_of_all_unknowns() -> None:

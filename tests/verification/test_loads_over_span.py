@@ -142,20 +142,6 @@ def test_one_load_in_many_ways(case: str, theory: str) -> None:
         np.testing.assert_allclose(tip, tips[0], rtol=0, atol=allowed * size)
 
 
-def test_reduced_model_knows_all_loads() -> None:
-    """The reduced model is exact in time to 1e-5, and the march of 2 ms to 1e-3 of the tip."""
-    loads = {
-        "distributed": SAME["harmonic"][0],
-        "at": [{"x": 4.0, "force": {"over_time": [[0, 0, 0], [0.1, 0, 5.0], [0.2, 0, 0.0]]}}],
-    }
-    tips = {}
-    for name, model in (("march", {}), ("reduced", {"reduced": True})):
-        tables = {"theory": "consistent_linear", **model}
-        tips[name] = computed(loads, motion=SPIN, time={"end": 0.4, "step": 2e-3}, model=tables).history["tip_u2"]
-    size = np.abs(tips["march"]).max()
-    np.testing.assert_allclose(tips["reduced"], tips["march"], rtol=0, atol=2e-3 * size)
-
-
 def test_dead_loads_turn_with_the_hub_in_the_inertial_frame() -> None:
     """Both frames, generalised-α of 2.5 ms: the difference is that of their second-order errors, 5e-4 here."""
     loads = {

@@ -122,16 +122,6 @@ def test_axes_are_those_of_the_hub() -> None:
         np.testing.assert_allclose(h[name], turning[name], atol=1e-4 * scale)
 
 
-def test_a_reduced_model_has_the_forces_of_the_full_one() -> None:
-    # A smooth spin-up; the error of the full run's steps, of second order, is 1.5e-4 here, that of the basis 1e-5.
-    scene = {**SCENE, "time": {"end": 2.0, "step": 0.005}, "motion": {"type": "spin_up", "speed": 2.0, "duration": 4.0}}
-    linear = {"theory": "consistent_linear"}
-    full = rotfem.run({**scene, "model": linear}).history
-    small = rotfem.run({**scene, "model": {**linear, "reduced": True}}).history
-    for name in BALANCES:
-        assert np.max(np.abs(full[name] - small[name])) < 1e-3 * np.max(np.abs(full[name])), name
-
-
 def test_spatial_beam_and_plate_at_rest() -> None:
     # Statics at the undeformed structure in the linear theory: f = −F, m = −(x − x_root)×F, whatever lies between.
     beam = {

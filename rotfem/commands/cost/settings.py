@@ -121,7 +121,7 @@ def sweep_speeds(scene: Scene) -> list[float]:
 
 def without_choices(scene: Scene) -> Scene:
     """Return a scene in its own setting."""
-    names = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
+    names = ("accuracy", "accuracy_of", "accuracy_budget")
     changes: dict[str, Any] = dict.fromkeys(names)
     if scene.time is not None:  # an accuracy may have given its steps
         changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
