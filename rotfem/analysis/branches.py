@@ -13,14 +13,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
-from rotfem.analysis.reduced_basis import Between, ReducedAnalysis
+from rotfem.analysis.reduced_basis import Between
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import SAME
@@ -33,11 +33,11 @@ SURE, AMBIGUOUS = 0.9, 0.5
 
 #: Least step of the model between two speeds, in parts of their distance (a narrower veering passes as a crossing), and
 #: most of its steps: a veering takes 34.
-FINEST, STEPS = 1e-5, 400
+FINEST, STEPS = 1e-5, 200
 
 #: Relative error of zeros of a model, and of those that only say where to solve first; the same of critical speeds and
 #: onsets, by an estimate that is 150 times too small near a veering; iterations for that, usually two.
-ZEROS, FIRST, LOCATED, ITERATIONS = 1e-11, 1e-7, 1e-12, 8
+ZEROS, FIRST, LOCATED, ITERATIONS = 1e-11, 1e-7, 1e-12, 40
 
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
@@ -94,17 +94,16 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     # The two products cancel the unknown scaling of x_b and y_b against each other.
     scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
     single = np.abs(here) * np.abs(there.T) / scale
-    joint = single.copy()
-    groups_a, groups_b = repeated(la, a.pairs.bounds), repeated(lb, b.pairs.bounds)
-    if len(groups_a) == len(la) and len(groups_b) == len(lb):
-        return joint, single
-    for i in groups_a:
-        for j in groups_b:
-            if len(i) > 1 or len(j) > 1:
-                part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
-                product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
-                joint[np.ix_(i, j)] = abs(np.trace(product)) / min(len(i), len(j))
-    return joint, single
+    groups = [repeated(lam, s.pairs.bounds) for lam, s in ((la, a), (lb, b))]
+    inverses = [np.diag(1.0 / np.where(d := own.diagonal(), d, np.inf)) for own in (own_a, own_b)]
+    for inverse, own, parts in zip(inverses, (own_a, own_b), groups, strict=True):
+        for i in (part for part in parts if len(part) > 1):
+            inverse[np.ix_(i, i)] = np.linalg.pinv(own[np.ix_(i, i)])
+    traces = (inverses[0] @ here @ inverses[1]) * there.T
+    firsts, sizes = ([[i[0] for i in parts] for parts in groups], [[len(i) for i in parts] for parts in groups])
+    sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
+    joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
+    return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
 
 
 def repeated(values: Array, bounds: Array) -> list[list[int]]:
@@ -166,7 +165,19 @@ def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
-class Path:
+class Model(Protocol):
+    """Modes between two speeds without a solution of the whole system."""
+
+    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
+        """Return the modes at both ends in the coordinates of the model."""
+        ...
+
+    def between(self, speed: float) -> Spinning:
+        """Return the modes at a speed, rad/s."""
+        ...
+
+
+class BranchPath:
     """Branches on the way from one solved speed to another, whose `order` is set.
 
     Args:
@@ -181,7 +192,7 @@ class Path:
         hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
     """
 
-    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], Between | ReducedAnalysis], count: int):
+    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], Model], count: int):
         self.left, self.right, self.count, self._make = left, right, count, model
         self.weak: dict[int, float] = {}
         self.hidden: float | None = None
@@ -191,7 +202,7 @@ class Path:
             self._follow()
 
     @cached_property
-    def model(self) -> Between | ReducedAnalysis:
+    def model(self) -> Model:
         """Model of the modes between the two speeds."""
         return self._make()
 
@@ -245,21 +256,27 @@ class Path:
         return point
 
     def zeros(self, f: Callable[[SpeedPoint], float], off: float = ZEROS) -> Iterator[tuple[float, float]]:
-        """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before."""
-        for (a, before), (b, after) in pairwise((p.speed, f(p)) for p in self.points):
+        """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before.
+
+        What it differs by between the modes solved at both ends and those of the model there, is taken off linearly.
+        """
+        (a, b), known = (self.left.speed, self.right.speed), {p.speed: f(p) for p in (self.left, self.right)}
+        apart = [known[x] - f(self.at(x)) for x in (a, b)]
+
+        def g(x: float) -> float:
+            try:
+                value = f(self.at(x))
+            except ComputationError:  # K is singular: this is the speed
+                return 0.0
+            return value + apart[0] + (x - a) / (b - a) * (apart[1] - apart[0])
+
+        known |= {p.speed: g(p.speed) for p in self.points[1:-1]}
+        for (low, before), (high, after) in pairwise(sorted(known.items())):
             if before * after < 0.0:
-                ends = {a: before, b: after}
-
-                def g(x: float, ends: dict[float, float] = ends) -> float:
-                    if x in ends:
-                        return ends[x]
-                    try:
-                        return f(self.at(x))
-                    except ComputationError:  # K is singular: this is the speed
-                        return 0.0
-
-                speed = float(brentq(g, a, b, xtol=off * max(abs(a), abs(b)), rtol=off))
-                yield speed, float(np.sign(before))
+                speed = brentq(
+                    lambda x: known[x] if x in known else g(x), low, high, xtol=off * max(abs(a), abs(b)), rtol=off
+                )
+                yield float(speed), float(np.sign(before))
 
 
 class Sweep:
@@ -281,19 +298,19 @@ class Sweep:
         self.analysis, self.count, self.only = analysis, count, only
         self.known: dict[float, Spinning] = {}
         self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
-        self.points, self.paths = list[SpeedPoint](), list[Path]()
+        self.points, self.paths = list[SpeedPoint](), list[BranchPath]()
         self.solves = self.inserted = 0
         self.ambiguous: list[dict[str, float]] = []
 
     @property
     def is_exact(self) -> bool:
         """Whether the model between speeds is the analysis itself."""
-        return isinstance(self.analysis, ReducedAnalysis)
+        return self.analysis.is_model
 
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> SpeedPoint:
         """Return the modes at a speed, its equilibrium continued from start."""
-        self.solves += 1
         known = self.known.pop(speed, None)
+        self.solves += known is None
         return SpeedPoint(known or self.analysis.at(speed, self.count + SPARE, start), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
@@ -330,27 +347,31 @@ class Sweep:
         self.points.append(target)
         self.paths.append(path)
 
-    def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> Path:
+    def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> BranchPath:
         """Return the way from one point to another; if `square` its model knows the points beside them, too."""
 
-        def model() -> Between | ReducedAnalysis:
-            if isinstance(self.analysis, ReducedAnalysis):
-                return self.analysis
+        def model() -> Model:
+            if self.is_exact:
+                return cast(Model, self.analysis)
             points = self.points if square else []
             beside = [p for p in points if p.speed < left.speed][-1:] + [p for p in points if p.speed > right.speed][:1]
             known = {p.speed: p.spinning for p in (left, right, *beside) if p.speed * (left.speed + right.speed) >= 0.0}
             square_too = square and left.speed * right.speed >= 0.0
             return Between((left.spinning, right.spinning), list(known.values()), square_too)
 
-        return Path(left, right, model, self.count)
+        return BranchPath(left, right, model, self.count)
 
-    def _depends_on_model(self, path: Path) -> bool:
+    def _depends_on_model(self, path: BranchPath) -> bool:
         """Return whether a model that is known to be poorer leads the branches elsewhere."""
         if len(path.points) == 2 or self.is_exact:
             return False
         other = replace(path.right)
         self._path(path.left, other, square=False)
         return bool(np.any(other.order[: self.count] != path.right.order[: self.count]))
+
+    def found(self) -> list[float]:
+        """Return all frequencies of the branches, rad/s."""
+        return [point.value(b).imag for point in self.points for b in range(self.count)]
 
     # --- what the diagram says ----------------------------------------------------------------------------------------
 
@@ -438,7 +459,7 @@ class Sweep:
 
     def _located(
         self,
-        path: Path,
+        path: BranchPath,
         f: Callable[[SpeedPoint], float],
         speed: float,
         sign: float,
@@ -500,7 +521,7 @@ class Sweep:
         ends = [np.inf if r["until"] is None else r["until"] for r in out]
         return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
 
-    def _changes(self, path: Path, before: str | None, after: str | None) -> float | None:
+    def _changes(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
         """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
         count = len(path.left.spinning.pairs.values)  # a model has more
 

@@ -23,7 +23,7 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
-from rotfem.numerics.projection import dense, new_directions, orthonormal, summed, times
+from rotfem.numerics.projection import dense, orthonormal, spanned, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -178,6 +178,8 @@ class ReducedAnalysis(ModalAnalysis):
         checks: speeds of full solutions with the largest relative difference of a frequency found there.
     """
 
+    is_model = True
+
     def __init__(self, full: ModalAnalysis):
         self.full = full
         self.basis = ProjectedPieces(full.system)
@@ -319,8 +321,8 @@ class Between:
     """Modes between two speeds that are solved, by interpolation of the pencil in a basis of the modes at both.
 
     M and C are polynomials of the speed Ω through what they are at the nodes, K is one of Ω², as the centrifugal force
-    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved,
-    whatever round-off in K says.
+    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved, but
+    for round-off in K.
 
     Args:
         both: the modes at the ends.
@@ -332,8 +334,7 @@ class Between:
         pencil, self._square = both[0].pencil, square
         self._scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
         vectors = np.hstack([v for s in both for v in (s.pairs.right, s.pairs.left)]) / self._scale
-        columns = np.hstack([vectors.real, vectors.imag])
-        self._V, self._comm = new_directions(pencil.comm, columns[:, :0], columns), pencil.comm
+        self._comm, self._V = pencil.comm, spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
         self._speeds = np.array([s.speed for s in nodes])
         X = self._scale * self._V
         self._matrices = np.array(
@@ -341,9 +342,6 @@ class Between:
         )
         self._asymmetries = {name: max(s.pencil.asymmetries[name] for s in both) for name in "MCK"}
         self._count = max(len(s.pairs.values) for s in both) + FURTHER
-        for node, s in enumerate(nodes):
-            if any(s is end for end in both):
-                self._corrected(node, s)
 
     def _pencil(self, speed: float) -> SmallPencil:
         def weights(at: float, places: Array) -> Array:
@@ -371,14 +369,6 @@ class Between:
         right, left = (self._coordinates(v) for v in (s.pairs.right, s.pairs.left))
         pairs, pencil = s.pairs, self._pencil(s.speed)
         return Spinning(s.speed, s.q, pencil, Eigenpairs(pairs.values, right, left, pairs.errors, pairs.bounds), pencil)
-
-    def _corrected(self, node: int, s: Spinning) -> None:
-        """Change K of a node so that the modes of an end are its modes, K symmetric where it was."""
-        (M, C, K), values, z = self._matrices[node], s.pairs.values, self._coordinates(s.pairs.right)
-        residual = values**2 * product(M, z) + values * product(C, z) + product(K, z)
-        inverse = np.linalg.pinv(np.hstack([z.real, z.imag]), rcond=1e-6)
-        E = np.hstack([residual.real, residual.imag]) @ inverse
-        K -= E + (E.T - (inverse.T @ np.hstack([z.real, z.imag]).T) @ E if s.pencil.conservative else 0.0)
 
     def between(self, speed: float) -> Spinning:
         """Return some more modes of the interpolated pencil at a speed (rad/s)."""
