@@ -196,9 +196,8 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
-        past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
-        notes: remarks on these paths.
+        notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
         is_model: whether it is a model of itself between speeds (see `rotfem.analysis.branches.Model`).
     """
@@ -223,7 +222,7 @@ class ModalAnalysis:
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)
-        self.past_limits, self.notes = False, list[str]()
+        self.notes = list[str]()
         self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -340,7 +339,7 @@ class ModalAnalysis:
         if start is not None:
             s.count_rotations_from(start.reference)
         first = None if start is None else start.q
-        return steady_state(s, speed, self.newton, first, self.past_limits, self.notes)
+        return steady_state(s, speed, self.newton, first, self.notes)
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of how the modes were solved; nothing special here."""

@@ -35,9 +35,9 @@ from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.results import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.values import LARGEST, Limits
+from rotfem.scene.values import LARGEST
 from rotfem.structures.mode_names import distinct, engineers_name
-from rotfem.units import split_unit
+from rotfem.units import speed_text, split_unit
 from rotfem.version import __version__
 
 Array = npt.NDArray[Any]
@@ -46,35 +46,31 @@ Array = npt.NDArray[Any]
 PAIRS = ("values", "right", "left", "errors", "bounds")
 
 
-def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
+def parse_speeds(text: str) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
 
     Args:
         text: what was asked for.
-        limits: of the scene; the usual ones if None.
 
     Raises:
-        SceneError: the text is neither, the speeds do not increase, or are too many.
+        SceneError: the text is neither, or the speeds do not increase.
     """
-    limits = limits or Limits()
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
     )
-    speeds, why = list[float](), None
+    speeds = list[float]()
     with suppress(ValueError):
         numbers, unit = split_unit(text)
         if ":" in numbers:
             first, last, number = numbers.split(":")
             ends, count = (float(first) * unit, float(last) * unit), int(number)
-            why = limits.refusal("speeds", count)
-            if why is None and max(map(abs, ends)) <= LARGEST:
+            if max(map(abs, ends)) <= LARGEST:
                 speeds = [float(s) for s in np.linspace(*ends, count)]
         else:
             speeds = [float(s) * unit for s in numbers.split(",")]
-            why = limits.refusal("speeds", len(speeds))
-    if why or len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
-        raise SceneError("command line", "--speeds", text, why or allowed)
+    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, allowed)
     return speeds
 
 
@@ -126,7 +122,7 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds)
     scene = scene.replace(marks) if marks else scene
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
-    values = parse_speeds(text, scene.limits)
+    values = parse_speeds(text)
 
     def compute(variant: Scene) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
@@ -268,7 +264,7 @@ def stopped_after(sweep: Sweep, values: Sequence[float], kept: FinishedSpeeds | 
     """Return how far a diagram came that has not all its speeds."""
     done = sum(point.requested for point in sweep.points)
     goes_on = "" if kept is None else "; the same command goes on from there"
-    return f"{done} of {len(values)} speeds are finished, up to {sweep.points[-1].speed:g} rad/s{goes_on}"
+    return f"{done} of {len(values)} speeds are finished, up to {speed_text(sweep.points[-1].speed)}{goes_on}"
 
 
 class FinishedSpeeds:
@@ -350,17 +346,17 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
     out = []
     out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
-        f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
+        f"ambiguous: {labels[int(a['branch']) - 1]} at {speed_text(a['speed'])}, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
     ]
     out += [
-        f"{onset['kind']} from {onset['speed']:.8g} rad/s "
-        + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
+        f"{onset['kind']} from {speed_text(onset['speed'], 8)} "
+        + ("on" if onset["until"] is None else f"to {speed_text(onset['until'], 8)}")
         for onset in onsets
     ]
     if sweep.only and not sweep.is_exact:
         out.append("critical speeds and onsets of instability are interpolated between the speeds that were solved")
-    return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *doubtful(ends))]
+    return out + [f"at {speed_text(last.speed)}, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
 
 def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:

@@ -139,7 +139,7 @@ class RunErrors:
         if system is self.system and self.shape is not None:
             q = self.shape.copy()
         else:
-            q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
+            q = steady_state(system, speed, Newton.of(solver))
         return output(system, State.at_rest(system, *system.start(q)))[None, :]
 
     def _of_mesh(self, output: Output) -> float | None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.interrupts import held_back
+from rotfem.commands.interrupts import importing
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.units import seconds_of
 from rotfem.version import __version__
@@ -52,7 +52,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an e
 
 
 def folder_option(default: str) -> Any:
-    """Return the option -o of a result folder."""
+    """Return the option -o of a folder."""
     return typer.Option("-o", "--output", metavar="DIR", parser=as_path, help=f"result folder [{default}]")
 
 
@@ -70,7 +70,7 @@ def _root(
     if files:
         from rotfem.scene.extensions import load
 
-        with Session(False, False, False):
+        with Session():
             for path in files:
                 load(str(path), path, "command line", "--load")
 
@@ -124,7 +124,7 @@ class Job:
 def job(
     command: str,
     scene: SceneFile,
-    output: Annotated[Path | None, folder_option("results/<scene name>")] = None,
+    output: Annotated[Path | None, folder_option("results/<scene name>/<command>")] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
@@ -145,7 +145,7 @@ def job(
     debug: Debug = False,
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
-    with held_back():  # in the middle of an import what signals raise becomes any error
+    with importing():  # in the middle of an import what signals raise becomes any error
         from rotfem.scene import load_scene
 
     with Session(as_json, quiet, debug) as session:
@@ -157,12 +157,11 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         if lacking := missing():
             raise InputError("", None, lacking)
-        session.speed_unit = loaded.output.speed
-        session.start(f"{loaded.name}: {command}")
+        session.start(f"{loaded.name}: {command}", loaded.output.speed)
         if output is None and loaded.name in ("", ".", ".."):
             raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
-        folder = session.folder(output or Path("results") / loaded.name, command, loaded.inputs)
-        with held_back():
+        folder = session.folder(output or Path("results", loaded.name, command), command, loaded.inputs)
+        with importing():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         if report and find_spec("bokeh") is None:
             raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")

@@ -111,7 +111,7 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
     system, motion = analysis.system.held, analysis.system.held.motion.at_speed(spinning.speed)
     forces, held, moments, q = [], [], list[Any](), spinning.q
     if system.linear and analysis.about == "steady":  # a load prestresses what is displaced
-        q = steady_state(system, spinning.speed, analysis.newton, past_limits=False, notes=[])
+        q = steady_state(system, spinning.speed, analysis.newton, notes=[])
     for t in (*SWEPT, SWEPT[0]):  # what is read of motions is about the loads that are constant
         system.set_time(t, motion)
         system.set_state(q)

@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.dense_output import RowTimes
+from rotfem.accuracy.answer import Series
+from rotfem.accuracy.outputs import OUTPUTS, of_columns, output_of
+from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import SMOOTHER, March, Steps, switches_of
@@ -43,6 +45,7 @@ from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.structures.symmetry import inactive_unknowns
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -56,6 +59,8 @@ class Simulation:
         store: what is kept of it on disk while it goes on, and the processes that run it.
         setting: of the refinement that it is an answer of, if it is.
         clock: called with the number of steps and the part of the history that is done.
+        times: rows (s) at which the output alone is wanted, to be compared, and the rest when `result` asks for it;
+            None for the rows of the scene, each with all that a history has.
     """
 
     def __init__(
@@ -65,8 +70,9 @@ class Simulation:
         store: RunStore,
         setting: Setting | None = None,
         clock: Callable[[int, float], None] | None = None,
+        times: Array | None = None,
     ):
-        self.scene, self.setting, self.clock = scene, setting, clock
+        self.scene, self.setting, self.clock, self.times = scene, setting, clock, times
         self.comm, self.store, self.log = store.comm, store, Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
@@ -76,10 +82,11 @@ class Simulation:
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
         self.system: Any = compile_system(problem, there, moving=scene.time is not None)
-        self.system.compile_readings()
+        if times is None:
+            self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
-        self.monitor = Monitor(self.system, critical_speed(self.system))
+        self.monitor = Monitor(self.system, critical_speed(self.system) if times is None else None)
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
         #: What the states came from: of a march its stepper and rows between steps.
@@ -87,6 +94,46 @@ class Simulation:
         self.rows: RowTimes | None = None
         self.last: State | None = None
         self.shape: Array | None = None
+        #: Legs of all steps; the output at the rows so far, and states of rows whose other values wait to be asked for.
+        self.steps = 0
+        self._output = OUTPUTS[output_of(scene)]
+        self._values = list[Array]()
+        self._waiting = list[State]()
+
+    @property
+    def output(self) -> Series:
+        """The output at the rows."""
+        if self.times is not None:
+            return Series(self.times[: len(self._values)], np.array(self._values))
+        history = self.record.history.arrays()
+        return Series(history["t"], of_columns(output_of(self.scene), history, self.system.structure))
+
+    def compute(self) -> Simulation:
+        """Compute the output at the rows, and nothing else; return this.
+
+        Raises:
+            ComputationError: it failed.
+        """
+        if self.scene.time is None:
+            self._steady()
+        else:
+            self.start = self._start(self.system)
+            self._march(self.scene.time, lambda share: None)
+        return self
+
+    def result(self) -> RunResult:
+        """Return the whole result of what was computed.
+
+        Raises:
+            ComputationError: a number of a row is not finite.
+        """
+        if self.times is not None:
+            self.system.compile_readings()
+            self.monitor.critical = critical_speed(self.system)
+            for state in self._waiting:
+                self._recorded(state)
+            self._waiting = []
+        return self.summarised("done")
 
     def run(self, progress: Progress | None = None) -> RunResult:
         """Return the result of the scene (see `rotfem.run`).
@@ -106,13 +153,13 @@ class Simulation:
                 self._march(self.scene.time, progress)
         except ComputationError as error:
             failure = self._with_cause(error)
-            failure.result = self.result("failed", failure)
+            failure.result = self.summarised("failed", failure)
             raise failure from (None if failure is error else error)
         except KeyboardInterrupt as stop:
             if not together(self.comm, stop):
                 raise
-            raise Stopped(self.result("interrupted")) from stop
-        return self.result("done")
+            raise Stopped(self.summarised("interrupted")) from stop
+        return self.summarised("done")
 
     # --- what yields states -----------------------------------------------------------------------------------------
 
@@ -120,15 +167,17 @@ class Simulation:
         """Compute the equilibrium at the speed of t = 0."""
         system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
         log.warnings += frozen_inputs(self.problem)
-        past_limits = self.scene.solver.past_limits
-        self.shape = steady_state(system, speed, self.iteration, past_limits=past_limits, notes=log.warnings)
+        self.shape = steady_state(system, speed, self.iteration, notes=log.warnings)
+        if self.times is not None:
+            self._sampled(State.at_rest(system, *system.start(self.shape)))
+            return
         stability = self.monitor.stability = stability_of(system, self.shape, speed)
         self._recorded(State.at_rest(system, *system.start(self.shape)))
         critical = self.monitor.critical
         if said := stability.warning():
             if critical is not None and abs(speed) > critical:
                 said += (
-                    f"; {abs(speed):g} rad/s is above the speed {critical:.6g} rad/s at which the "
+                    f"; {speed_text(abs(speed))} is above the speed {speed_text(critical)} at which the "
                     f"{self.problem.theory.name} stiffness is singular"
                 )
             log.warnings.append(said)
@@ -139,10 +188,12 @@ class Simulation:
         march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
         self.stepper = march.stepper
         march.reached = self.store.start(self._memory())
-        if time.output_step is not None:
-            passed = max(len(self.record.history) - 1, 0)
-            self.rows = RowTimes(time.output_step, time.end, scheme.order, self.system.comm, passed)
+        times = self.times if time.output_step is None else multiples(time.output_step, time.end)
+        if times is not None:
+            begin = 0.0 if march.reached is None else march.reached.t
+            self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
             self.stepper.observers.append(self.rows)
+        self.stepper.observers.append(self._leg)
         with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
@@ -152,15 +203,21 @@ class Simulation:
         """Return what the history starts from in a system, which may be of another mesh or theory."""
         there = system.model.problem
         problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
-        return first_state(self.scene, problem, system, judged=system is self.system)
+        return first_state(self.scene, problem, system, judged=system is self.system and self.times is None)
 
     # --- what sees them ---------------------------------------------------------------------------------------------
+
+    def _leg(self, old: State, new: State, leg: Any) -> None:
+        self.steps += 1
+
+    def _sampled(self, state: State) -> None:
+        """Take the output of a row; the rest of it waits."""
+        self._values.append(self._output(self.system, state))
+        self._waiting.append(state)
 
     def _stepped(self, state: State, time: Time, progress: Progress) -> None:
         """Show a state of the march to all that observe it."""
         steps = self.log.steps
-        if (why := self.scene.limits.refusal("steps", steps)) is not None:
-            raise ComputationError(f"the motion {why}", time=state.t)
         self.monitor.step(state)
         self.last = state
         rows = [state]
@@ -169,7 +226,7 @@ class Simulation:
         elif steps % time.output_every and state.t < time.end * (1 - 1e-9):
             rows = []
         for row in rows:
-            self._recorded(row)
+            (self._recorded if self.times is None else self._sampled)(row)
             progress(row.t / time.end)
         self.store.stepped(state)
         if self.clock is not None:
@@ -186,16 +243,16 @@ class Simulation:
 
     # --- the result -------------------------------------------------------------------------------------------------
 
-    def result(self, status: str, failure: ComputationError | None = None) -> RunResult:
+    def summarised(self, status: str, failure: ComputationError | None = None) -> RunResult:
         """Return everything computed so far with a summary of how it went."""
         history, log = self.record.history.arrays(), self.log
         log.warnings += [] if self.stepper is None else self.stepper.warnings()
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
         watched = self.monitor
-        if status == "done" and watched.since is not None:
+        if status == "done" and watched.since is not None and watched.critical is not None:
             log.warnings.append(
-                f"the speed is above {watched.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is "
+                f"the speed is above {speed_text(watched.critical)}, where the {self.problem.theory.name} stiffness is "
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
         errors = RunErrors(

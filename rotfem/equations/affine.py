@@ -76,11 +76,7 @@ class AffineSystem(System):
         return other
 
     def check_terms(self) -> None:
-        """Refuse terms of a user that are no polynomials of the constants.
-
-        Raises:
-            InputError: one is no polynomial of second degree of the constants.
-        """
+        """Refuse terms of a user that are no polynomials of the constants."""
         problem = self.model.problem
         for name in self._decomposed.not_polynomial:
             others = ", ".join(f'"{theory.name}"' for theory in theories() if not theory.linear)

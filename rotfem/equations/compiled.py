@@ -18,16 +18,8 @@ from rotfem.structures.structure import check_memory
 def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True, parted: bool = False) -> Any:
     """Return the system of a problem: affine for a linear theory, bordered where the hub is free.
 
-    Args:
-        problem: what is to be computed.
-        comm: communicator the structure is distributed over.
-        moving: whether it will be stepped in time; steady states and modes need fewer forms.
-        parted: whether effects will be left out, or it is for some hundred steps. Forms are then shared with other
-            nonlinear theories of the problem (see `NonlinearSystem`), and those of planar beams compiled without
-            optimisation.
-
-    Raises:
-        InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
+    A system that is not `moving`, of steady states and modes, needs fewer forms; `parted` shares forms between the
+    nonlinear theories (see `NonlinearSystem`).
     """
     view = View()
     seen, signals = viewed(problem, view) if moving else (problem, [])

@@ -59,13 +59,6 @@ def modes_at_rest(system: Any, count: int) -> ModesAtRest:
     """Return the first modes that vibrate, as many as wanted or as there are.
 
     Shapes of equal frequency are combined so that each belongs to one family, if possible.
-
-    Args:
-        system: equations of motion of a structure, its hub held.
-        count: number of modes.
-
-    Raises:
-        ComputationError: the eigensolver failed.
     """
     M, K = system.matrices_at_rest()
     count = min(count, massed(M))
@@ -103,13 +96,7 @@ def massed(M: Any) -> int:
 
 
 def family_products(system: Any, X: Array, MX: Array) -> dict[str, Array]:
-    """Return family ↦ x_i^H M x_j of the components that belong to it, over all ranks, (m, m).
-
-    Args:
-        system: equations of motion of a structure.
-        X: owned unknowns, (n, m); those behind the structure's are ignored.
-        MX: M X.
-    """
+    """Return family ↦ x_i^H M x_j of the components that belong to it, over all ranks, (m, m)."""
     structure, bs = system.structure, system.V.dofmap.index_map_bs
     owned = system.V.dofmap.index_map.size_local * bs
     x, mx = (structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX))
@@ -144,12 +131,7 @@ class ByMode(LowRank):
 
 
 def damping_by_mode(system: Any) -> ByMode | None:
-    """Return the part of C of damping by mode; None without.
-
-    Raises:
-        InputError: there are not as many modes, or no such family, or the frame does not rotate.
-        ComputationError: the modes at rest cannot be computed.
-    """
+    """Return the part of C of damping by mode; None without."""
     damping = system.model.problem.structure.damping
     if EFFECT not in system.model.effects or not damping.has_modal:
         return None
@@ -168,9 +150,6 @@ def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
     """Return (modes, their ratios) in the order of frequency, or of each family in that order.
 
     A mode is in the family that has most of its energy.
-
-    Raises:
-        InputError: there is no such family, or there are fewer modes than ratios, of a model with all its effects.
     """
     known, several = system.structure.families, isinstance(ratios, Mapping | tuple)
     if isinstance(ratios, Mapping):

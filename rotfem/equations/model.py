@@ -118,11 +118,7 @@ class Model:
         self._stretch: Any = None
 
     def at_rest(self, form: Any, undeformed: bool = False) -> dict[str, Any]:
-        """Return a form and its derivatives at v = a = 0 (see `rotfem.numerics.forms.at_rest`).
-
-        Raises:
-            InputError: a term of a user has none there.
-        """
+        """Return a form and its derivatives at v = a = 0 (see `rotfem.numerics.forms.at_rest`)."""
         try:
             return forms.at_rest(form, *self.structure.k.functions[:3], undeformed)
         except ValueError:  # of UFL, for a division by zero
@@ -130,11 +126,7 @@ class Model:
             raise
 
     def check_smooth(self) -> None:
-        """Refuse terms of a user that are not differentiable at zero velocities, as |v| v.
-
-        Raises:
-            InputError: names the term.
-        """
+        """Refuse terms of a user that are not differentiable at zero velocities, as |v| v."""
         for name in (name for name, effect in self.acting.items() if callable(effect.work)):
             try:
                 C = forms.at_rest(self.terms[name], *self.structure.k.functions[:3], undeformed=True)["C"]
@@ -195,13 +187,7 @@ class Model:
         return out
 
     def derived_forms(self, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
-        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
-
-        Args:
-            purpose: which forms.
-            make: derives and compiles them.
-            more: further functions and constants of the forms, always in one order.
-        """
+        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes."""
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
         functions = [*residual.coefficients(), *(x for x in more if isinstance(x, ufl.Coefficient))]

@@ -84,10 +84,6 @@ class PointStresses:
         """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], the UFL form added to K.
 
         A viscous stress C η Γ̇ = C η DΓ(q)[v] is taken the same way, with DΓ(q_k)[v_{k+1}] + D²Γ(q_k)[v_k, d].
-
-        Args:
-            trial: direction of the derivative.
-            c_v: ∂v/∂q of the step, a constant (1/s); None of a system at rest, where nothing is viscous.
         """
         k, out, viscosity = self.mechanics.k, 0, self.mechanics.damping.stiffness
         for s in self.mechanics.strains:
@@ -242,11 +238,8 @@ class NonlinearSystem(System):
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.
 
-        Args:
-            c_k: factor of K; of a system that is not moving one factor is 1 and the others are 0.
-            c_v: factor of C.
-            c_m: factor of M.
-            before: q from which a correction has led to the state (see `PointStresses`); None for the true tangent.
+        Of a system that is not moving one factor is 1, the others are 0. With the q before the last correction its
+        geometric part has the stresses of `PointStresses`.
         """
         if before is None or self.plain:
             parts = self._terms((c_k, c_v, c_m))

@@ -38,13 +38,6 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
     """Return ∫ σ⁰·D²Γ[u, w] at rest, a UFL form: of N⁰ alone, or of all stress resultants (`Model.prestresses`).
 
     It is 0 if no active component has such forces.
-
-    Args:
-        model: whose strains have the forces σ⁰.
-        state: the function q (m, rad), and the displacement that σ⁰ belongs to.
-        u: a displacement, or an argument of the form.
-        w: another.
-        theory: with the second-order strains Γ that σ⁰ works on.
     """
     q, base = state
     s = model.structure

@@ -97,9 +97,6 @@ class Solutions:
         """Return the correction δa with which F = 0 at the state and time set: M δa = −F.
 
         Unknowns without inertia (the rotation without rotary inertia) follow the others: K δa = 0 in their rows.
-
-        Args:
-            at_rest: whether M is taken of the undeformed structure, or of the reference; its factor is kept.
         """
         solver, massless = self.mass_solver(at_rest)
         b = self.residual()

@@ -152,11 +152,7 @@ class System(Solutions, ABC):
         return None if self.structure.turns is None else self.structure.turns.reference
 
     def check_reach(self, q: Array, time: float | None = None) -> None:
-        """Refuse rotations in q (local dof array) that are too far from their reference.
-
-        Raises:
-            BeyondReach: they have.
-        """
+        """Refuse rotations in q (local dof array) that are too far from their reference."""
         if self.structure.turns is not None:
             self.structure.turns.check(q, time)
 
@@ -287,11 +283,7 @@ class System(Solutions, ABC):
     # --- matrices --------------------------------------------------------------------------------------------------
 
     def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
-        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C.
-
-        Args:
-            keep: whether they must outlast the next state or time that is set.
-        """
+        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C."""
         return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
 
     def matrices_at_rest(self) -> tuple[Any, Any]:

@@ -87,13 +87,7 @@ class Strain:
     gains: Mapping[str, Gain] = field(default_factory=dict)
 
     def gaining(self, effects: Collection[str], switched: Callable[[str, Any], Any], first_order: bool) -> Strain:
-        """Return the strain with what these effects add to it, each times its switch.
-
-        Args:
-            effects: names of those that are in the equations.
-            switched: (effect, expression) ↦ the expression times the switch of the effect.
-            first_order: whether it is one of first order in q.
-        """
+        """Return the strain with what these effects add to it, each times its switch."""
         value = self.value
         for name, gain in self.gains.items():
             part = gain.first if first_order else gain.first + gain.higher

@@ -165,13 +165,7 @@ def tabulated_pitch(rows: npt.ArrayLike) -> TimeSignal:
 
 
 def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> TimeSignal:
-    """Return (θ, θ̇, θ̈) of a function of time: differences whose step follows it, not before t = 0.
-
-    Args:
-        angle: t (s) ↦ θ, rad.
-        rate: t (s) ↦ θ̇ (rad/s); differences of the angle if None.
-        cell: length of time (s) in which differences have one step (`rotfem.mechanics.differentiation`).
-    """
+    """Return (θ, θ̇, θ̈) of a function of time: differences whose step follows it, not before t = 0."""
     first = rate or Derivative(angle, 1, cell, (0.0,))
     return angle, first, Derivative(angle, 2, cell, (0.0,)) if rate is None else Derivative(rate, 1, cell, (0.0,))
 

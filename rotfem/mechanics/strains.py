@@ -191,10 +191,6 @@ def reissner_plate(q: Any, t: Any = None) -> tuple[Any, Any, Any]:
     """Return ½ (r,γ·r,β − δ_γβ), r,β·t and −½ (r,γ·t,β + r,β·t,γ) with the unit director t.
 
     Simo & Fox 1989, the fully nonlinear plate of Simo & Vu-Quoc 1986.
-
-    Args:
-        q: unknowns.
-        t: the director, where it is not simply that of alpha.
     """
     p = PlateGradients(q)
     dr, t = p.dr, director(p.alpha) if t is None else t

@@ -11,9 +11,5 @@ from rotfem.registry import resolved, structures
 
 
 def build(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
-    """Return the discretised structure of a problem.
-
-    Raises:
-        InputError: a mesh or a section that cannot be computed with.
-    """
+    """Return the discretised structure of a problem."""
     return resolved(structures[problem.structure.type].discretised)(problem, comm)

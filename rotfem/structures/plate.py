@@ -35,11 +35,7 @@ from rotfem.structures.structure import Array, PointValues, Structure, check_mem
 
 
 def plate_points(plate: Structure) -> Points:
-    """Return the points of masses and loads of a plate.
-
-    Raises:
-        InputError: one is not on the plate.
-    """
+    """Return the points of masses and loads of a plate."""
     masses = [row[:2] for row in plate.data.point_masses]
     applied = [point.x for point in plate.point_loads]
     points = Points(plate.mesh, [*masses, *applied])
@@ -79,14 +75,7 @@ def constants(data: Any) -> dict[str, float]:
 
 
 def thickness_field(data: Any, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
-    """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines.
-
-    Args:
-        data: of the structure.
-        grid: its mesh.
-        rows: places of rows of tables that may be inside cells (m).
-        degree: of the field, if there are any (see `rotfem.structures.section_fields`).
-    """
+    """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines."""
     if isinstance(data.thickness, dict):
         h = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name="thickness")
         for name, value in data.thickness.items():
@@ -316,11 +305,7 @@ class Plate(Structure):
     # --- loads ------------------------------------------------------------------------------------------------------
 
     def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
-        """Return the work of one load: tip force and moment are spread over the edge "tip".
-
-        Raises:
-            InputError: there is no such edge for them.
-        """
+        """Return the work of one load: tip force and moment are spread over the edge "tip"."""
         if name.startswith("tip") and not self._has_tip:
             why = 'needs a physical curve "tip" in the mesh, which it works on'
             raise InputError(f"loads.{name}", None, why)
@@ -412,11 +397,7 @@ class Plate(Structure):
         return disk_wave(coordinates, values[:, 2], axis[2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state whose director has come to the pole of its angles, where these have no reference.
-
-        Raises:
-            ComputationError: says how far it has come.
-        """
+        """Refuse a state whose director has come to the pole of its angles, where these have no reference."""
         if self.turns is not None or self.size < len(self.components):
             return
         owned, limit = self.V.dofmap.index_map.size_local, DirectorTurns.limit

@@ -89,13 +89,7 @@ class Turns:
         return cls(structure) if structure.problem.theory.exact else None
 
     def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
-        """Return the curvature of the next reference at the points of the polynomials.
-
-        Args:
-            reference: the present one.
-            rotations: at the points, (cells, points, 3 or 2).
-            nodal: at the nodes of the unknowns, cell by cell, (cells, nodes of a cell, 3 or 2).
-        """
+        """Return the curvature of the next reference at the points of the polynomials."""
         raise NotImplementedError
 
     # --- range ------------------------------------------------------------------------------------------------------
@@ -117,11 +111,7 @@ class Turns:
         return now * self.limit > self.enough or (v is not None and 2 * now > 1.0 and self.reached(q, v, h) > 1.0)
 
     def check(self, q: Array, time: float | None = None) -> None:
-        """Refuse rotations that have come farther from their reference than they may.
-
-        Raises:
-            BeyondReach: they have.
-        """
+        """Refuse rotations that have come farther from their reference than they may."""
         if (part := self.reached(q)) > 1.0:
             raise BeyondReach(f"rotations changed by {part * self.limit:.3g} rad at once", time)
 
@@ -252,11 +242,7 @@ class DirectorTurns(Turns):
 
 
 def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
-    """Refuse a state in which some section of a spatial beam has turned by more than a full turn.
-
-    Raises:
-        ComputationError: says where; rotation vectors stand for rotations one to one only up to there.
-    """
+    """Refuse a state in which some section of a spatial beam has turned by more than a full turn."""
     coordinates, values = beam.nodes(q)
     turns = np.linalg.norm(values[:, 3:], axis=1)
     worst = int(np.argmax(turns))

@@ -36,16 +36,7 @@ TURNS = {
 
 
 def along_axis(names: tuple[str, ...], place: Array, axis: Array) -> tuple[Array, Array]:
-    """Return the moment about the axis of spin that unit components make, and the moment that is one about it.
-
-    Args:
-        names: of the components, f1, f2, … m3.
-        place: of the root, from the axis (3,), m.
-        axis: direction of the axis, (3,).
-
-    Returns:
-        e·(place×f + m) of every component, and the components of m = e.
-    """
+    """Return e·(place×f + m) of unit components f1 … m3, and the components of m = e; place (m) and e are (3,)."""
     units = {name: np.eye(3)[int(name[1]) - 1] for name in names}
     arms = [axis @ (np.cross(place, unit) if name[0] == "f" else unit) for name, unit in units.items()]
     turn = [axis @ unit if name[0] == "m" else 0.0 for name, unit in units.items()]
@@ -83,12 +74,7 @@ class RootReaction:
         """Return what all owned unknowns change by in the unit motions if the whole structure goes along.
 
         Rotation vectors are turned as such, ∂θ/∂φ = T⁻¹(θ); the angles of plates as small ones.
-
-        Args:
-            q: local dof array of the displaced structure, which turns with its displacements; undeformed if None.
-
-        Returns:
-            Shape (unknowns, components of names).
+        Shape (unknowns, components of names); the structure is displaced by q, a local dof array.
         """
         structure, owned = self._structure, self._structure.V.dofmap.index_map.size_local
         values: Array = np.zeros((owned, structure.size))

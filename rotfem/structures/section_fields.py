@@ -42,15 +42,10 @@ leggauss = cache(legendre.leggauss)
 def field_values(
     at: Callable[[Array, Array], Any], rows: Array, degree: int, space: fem.FunctionSpace, valid: Valid | None = None
 ) -> Array:
-    """Return the values of a property at the nodes of a discontinuous space, (nodes, components).
+    """Return the values of a property at(x, near) at the nodes of a discontinuous space, (nodes, components).
 
-    Args:
-        at: (x, near), (n,) in m ↦ values (n,) or (n, components); near are on the side of x that counts at a jump.
-        rows: places of the rows (m), increasing.
-        degree: k, of the unknowns.
-        space: the space.
-        valid: what a projection must be where the table is. Where it is not, as where stiffness falls by orders of
-            magnitude within an element, the mean takes its place. None: anything is valid.
+    `near` are places on the side of x that counts at a jump; rows (m) increase. Where a projection is not `valid`, as
+    where stiffness falls by orders of magnitude within an element, the mean takes its place.
     """
     dofmap, x = space.dofmap.list, space.tabulate_dof_coordinates()[:, 0]
     middle = np.empty_like(x)

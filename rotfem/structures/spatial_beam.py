@@ -45,13 +45,7 @@ AXIS_DEGREE = 5
 
 
 def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
-    """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X.
-
-    Args:
-        beam: the discretised beam; kinks and ends of arcs are its nodes.
-        sweep: a number, or rows (x, angle) between which the axis is an arc and, where one x stands twice, kinked.
-        line: the same as `at(x, near)` and `angles(x, near)` over the arc length (m).
-    """
+    """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X."""
     if not isinstance(sweep, tuple):
         chi = beam.scalar("sweep", sweep)
         X = ufl.SpatialCoordinate(beam.mesh)[0]
@@ -69,10 +63,6 @@ def curved_axis(beam: Beam, line: Any) -> tuple[Any, Any, Any]:
 
     Angles are discontinuous, so that they jump at kinks. Where no point of the line lies inside an element they are
     right to their degree. The axes that are made of them are unit vectors across each other everywhere.
-
-    Args:
-        beam: the discretised beam; kinks of the line are its nodes.
-        line: `at(x, near)` and `angles(x, near)` over the arc length (m).
     """
     both = beam.field("angles", lambda x, near: np.stack(line.angles(x, near), axis=-1), AXIS_DEGREE, 2)
     space = element("Lagrange", beam.mesh.basix_cell(), AXIS_DEGREE, shape=(3,))
@@ -436,9 +426,6 @@ class SpatialBeam(Beam):
         """Refuse a state in which some section has turned by more than a turn, where that has no reference.
 
         In a plane a rotation vector has one component, and no limit.
-
-        Raises:
-            ComputationError: says where.
         """
         in_plane = self.size < len(self.components) and self.problem.theory.exact
         if self.turns is None and not in_plane:

@@ -34,12 +34,6 @@ def stretch_by_twist(radius_squared: Any, twist: Any, pretwist: Any, warping: An
     of the section takes of them (Krenk, Int. J. Solids Struct. 19 (1983) 67): nothing is left of it in a circle, all of
     it in a thin strip. The axis of twist is that of the shear centers. What twist makes of the strains over the section
     beside their mean, a stiffness of fourth order in the width, is left out.
-
-    Args:
-        radius_squared: r² (m²).
-        twist: K₁ (1/m).
-        pretwist: k⁰ (1/m); the number 0 without.
-        warping: J/A (m²).
     """
     first = 0 if isinstance(pretwist, int) else pretwist * (radius_squared - warping) * twist
     return Gain(first, radius_squared * twist**2 / 2)
@@ -49,9 +43,6 @@ def radius_of(C: Any) -> Any:
     """Return r² (m²) of a section stiffness (6, 6), r from its shear center.
 
     Of the moments about the tension center and the distance of both centers.
-
-    Args:
-        C: symmetric, strains in the order (Γ₁, Γ₂, Γ₃, K₁, K₂, K₃); entries are expressions or arrays, or the number 0.
     """
     EA = C[0][0]
     shares = [0 if isinstance(c, int) else c / EA for c in C[0]]

@@ -32,20 +32,7 @@ Array = npt.NDArray[np.float64]
 def check_memory(
     key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm, times: float = 1.0
 ) -> None:
-    """Refuse a mesh whose matrices do not fit into memory.
-
-    Args:
-        key: what asks for so many elements.
-        value: what is given there.
-        nodes: nodes of the unknowns there will be.
-        components: unknowns of a node.
-        dimension: of the mesh.
-        comm: communicator that shares it; on every process the same is raised.
-        times: memory of what is computed over that of what takes least, modes.
-
-    Raises:
-        InputError: says how much would be needed, and how much there is.
-    """
+    """Refuse a mesh whose matrices do not fit into memory."""
     unknowns = float(nodes) * components
     if unknowns < 1e5:  # nothing is asked of the system for what fits anywhere
         return
@@ -64,11 +51,7 @@ def check_memory(
 
 
 def memory() -> float:
-    """Return the bytes that this machine lets a program have, or that the user says it may have.
-
-    Raises:
-        InputError: what the user says is no number.
-    """
+    """Return the bytes that this machine lets a program have, or that the user says it may have."""
     given = os.environ.get("ROTFEM_MEMORY", "")
     if given:
         try:
@@ -226,11 +209,7 @@ class Structure:
         return out
 
     def check_shared(self) -> None:
-        """Refuse a mesh that leaves a process without cells or unknowns, where it would fail or wait for ever.
-
-        Raises:
-            InputError: says how many cells there are; on every process the same.
-        """
+        """Refuse a mesh that leaves a process without cells or unknowns, where it would fail or wait for ever."""
         cells, nodes = self.mesh.topology.index_map(self.mesh.topology.dim), self.V.dofmap.index_map
         idle = self.comm.allreduce(int(min(cells.size_local, nodes.size_local) == 0))
         if idle == 0:
@@ -348,11 +327,7 @@ class Structure:
         return self.problem.loads.at
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction in the frame.
-
-        Raises:
-            InputError: the structure lacks what one of them works on.
-        """
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction."""
         given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
         return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
 
@@ -452,8 +427,4 @@ class Structure:
         return q if self.turns is None else self.turns.total(q)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state (local dof array) outside the range of the unknowns; there is none here.
-
-        Raises:
-            ComputationError: never here; see the spatial beam and the plate.
-        """
+        """Refuse a state (local dof array) outside the range of the unknowns; there is none here."""

@@ -67,11 +67,7 @@ def _bends_only(problem: Problem) -> bool:
 
 
 def directions(problem: Problem) -> tuple[Array, Array]:
-    """Return in which directions of the frame anything drives a problem at any time, True also where that is unknown.
-
-    Returns:
-        Those of forces and accelerations, and those of moments and of the axis of the spin, shape (3,) each.
-    """
+    """Return in which directions (3,) polar and axial vectors may drive a problem at any time, frame components."""
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
     polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)

@@ -148,7 +148,7 @@ def test_what_is_zero_has_no_panel() -> None:
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["tip u₂", "tip u₃"]
     suptitle = figure.get_suptitle()
-    assert suptitle.startswith("blade: reissner, 6 rad/s\n")
+    assert suptitle.startswith("blade: reissner, rotating frame, 6 rad/s\n")
     assert suptitle.endswith("0 (below 1e-9 of the largest of the unit): tip u₁, tip rotation θ₁")
 
 

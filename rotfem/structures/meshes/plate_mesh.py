@@ -83,11 +83,7 @@ class PlateGrid:
 
 
 def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
-    """Return the mesh of a plate.
-
-    Raises:
-        InputError: a mesh file that is no mesh of a plate; on every process the same.
-    """
+    """Return the mesh of a plate."""
     data = problem.structure
     if data.mesh is None:
         return rectangle(data, problem.mesh, comm, problem.loads.stations)
@@ -117,16 +113,7 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] 
 
 
 def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
-    """Return the mesh of a gmsh file: physical curves (one is "clamped") and the physical surface "plate" or regions.
-
-    Args:
-        path: the file.
-        regions: names of the surfaces that must make up the plate; if empty, "plate" does.
-        comm: MPI communicator; the file is read on rank 0.
-
-    Raises:
-        InputError: the file is no such mesh; on every process the same.
-    """
+    """Return the mesh of a gmsh file: physical curves, "clamped" among them, and the surface "plate" or regions."""
     import gmsh
 
     groups: dict[int, dict[str, int]] = {}
