@@ -21,11 +21,12 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import h5py
 import numpy as np
 
+from rotfem.results.checkpoint_file import read_checkpoint
 from rotfem.results.files import read_csv
 from tests.beams import BEAM_TABLE, PLATE_TABLES
+from tests.histories import difference
 
 BEAM = f"""\
 {BEAM_TABLE}[motion]
@@ -70,9 +71,8 @@ def reached(out: Path) -> tuple[str, float, float]:
     status = json.loads((out / "summary.json").read_text())["status"] if (out / "summary.json").exists() else "nothing"
     rows = read_csv(out / "history.csv")["t"] if (out / "history.csv").exists() else np.zeros(0)
     saved = 0.0
-    if (out / "checkpoint.h5").exists():
-        with h5py.File(out / "checkpoint.h5") as file:
-            saved = float(json.loads(bytes(file["tree"][()]))["dict"]["t"])
+    if (out / "checkpoint.npz").exists():
+        saved = float(read_checkpoint(out / "checkpoint.npz")["t"])
     return status, float(rows[-1]) if len(rows) else 0.0, saved
 
 
@@ -80,7 +80,7 @@ def broken(folder: Path, name: str, ranks: int, kills: int, whole: float) -> tup
     """Kill a run that takes `whole` seconds so many times and resume it; return what was found, and times lost (s)."""
     out, seen, lost, done = folder / f"{name}-{ranks}-cut", Counter[str](), [], 0
     while True:
-        resume = ["--resume"] if (out / "checkpoint.h5").exists() else []
+        resume = ["--resume"] if (out / "checkpoint.npz").exists() else []
         program = start(folder, ranks, name, "-o", str(out), "--checkpoint", "20", *resume)
         if done == kills:
             assert program.wait() == 0
@@ -95,12 +95,6 @@ def broken(folder: Path, name: str, ranks: int, kills: int, whole: float) -> tup
             status, rows, saved = reached(out) if out.is_dir() else ("nothing", 0.0, 0.0)
             seen[status] += 1
             lost.append(max(rows - saved, 0.0))
-
-
-def difference(one: Path, two: Path) -> float:
-    """Return the largest difference of two histories, relative to the largest value of each column."""
-    a, b = read_csv(one / "history.csv"), read_csv(two / "history.csv")
-    return max(float(np.max(np.abs(a[c] - b[c])) / (np.max(np.abs(a[c])) or 1.0)) for c in a)
 
 
 def main() -> None:
@@ -121,9 +115,10 @@ def main() -> None:
             begun = time.monotonic()
             assert start(folder, ranks, name, "-o", str(out)).wait() == 0
             seen, lost = broken(folder, name, ranks, kills, time.monotonic() - begun)
+            apart = difference(*(read_csv(folder / f"{name}-{ranks}{x}" / "history.csv") for x in ("-cut", "")))
             print(
                 f"{name} on {ranks}: {kills} kills, folders then {dict(seen)}; "
-                f"largest difference {difference(out, folder / f'{name}-{ranks}-cut'):.1e}, "
+                f"largest difference {apart:.1e}, "
                 f"computed again at most {max(lost, default=0.0):.3g} s of motion",
                 flush=True,
             )

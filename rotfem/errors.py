@@ -145,7 +145,7 @@ class OutputError(OSError):
         self.reason = reason
 
     def __str__(self) -> str:
-        return f"output {self.path}: cannot be written: {self.reason}; choose a writable folder with -o DIR"
+        return f"output {self.path}: cannot be written: {self.reason}; choose another folder with -o DIR"
 
 
 def show(value: Any) -> str:

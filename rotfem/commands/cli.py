@@ -241,7 +241,7 @@ def sweep(
     overrides: Annotated[
         list[str], typer.Option("--set", metavar="KEY=A:B:N", help="values of a scene key, or KEY=A,B,…; repeatable")
     ],
-    output: Annotated[Path | None, folder_option("results/sweep-<scene name>")] = None,
+    output: Annotated[Path | None, folder_option("results/<scene name>/sweep")] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", metavar="N", help="processes that compute")] = 1,
     as_json: Json = False,
     no_plots: NoPlots = False,
@@ -256,7 +256,7 @@ def sweep(
     from rotfem.commands.sweep import values_of
 
     with Session(as_json, quiet, debug) as session:
-        folder = session.folder(output or Path("results") / f"sweep-{scene.stem}", "sweep", [scene])
+        folder = session.folder(output or Path("results", scene.stem, "sweep"), "sweep", [scene])
         keys = {}
         for text in overrides:
             key, _, values = text.partition("=")
@@ -287,7 +287,7 @@ def import_(
     from rotfem.commands.import_blade import import_blade, write_imported
     from rotfem.scene.files import noted_files
 
-    with Session(False, quiet, debug) as session:
+    with Session(quiet=quiet, debug=debug) as session:
         with noted_files() as inputs:
             scene = import_blade(file, kind, overrides or ())
         session.check_writable("-o", output, inputs)

@@ -52,7 +52,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an e
 
 
 def folder_option(default: str) -> Any:
-    """Return the option -o of a result folder."""
+    """Return the option -o of a folder."""
     return typer.Option("-o", "--output", metavar="DIR", parser=as_path, help=f"result folder [{default}]")
 
 
@@ -70,7 +70,7 @@ def _root(
     if files:
         from rotfem.scene.extensions import load
 
-        with Session(False, False, False):
+        with Session():
             for path in files:
                 load(str(path), path, "command line", "--load")
 
@@ -124,7 +124,7 @@ class Job:
 def job(
     command: str,
     scene: SceneFile,
-    output: Annotated[Path | None, folder_option("results/<scene name>")] = None,
+    output: Annotated[Path | None, folder_option("results/<scene name>/<command>")] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
@@ -157,11 +157,10 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         if lacking := missing():
             raise InputError("", None, lacking)
-        session.speed_unit = loaded.output.speed
-        session.start(f"{loaded.name}: {command}")
+        session.start(f"{loaded.name}: {command}", loaded.output.speed)
         if output is None and loaded.name in ("", ".", ".."):
             raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
-        folder = session.folder(output or Path("results") / loaded.name, command, loaded.inputs)
+        folder = session.folder(output or Path("results", loaded.name, command), command, loaded.inputs)
         with importing():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         if report and find_spec("bokeh") is None:

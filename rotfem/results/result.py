@@ -127,11 +127,12 @@ class Result(ABC):
         """Write the files into a folder, in the place of the results that are there; return their paths.
 
         Raises:
-            OutputError: the folder cannot be written, or another process writes its results there.
+            OutputError: the folder cannot be written, or is neither empty nor one of rotfem's.
         """
-        from rotfem.results.result_set import ResultSet
+        from rotfem.listeners import ONE_PROCESS
+        from rotfem.results.result_set import ResultFolder
 
-        with ResultSet(Path(folder), self.summary.get("command", "")) as results:
+        with ResultFolder(ONE_PROCESS, Path(folder), self.summary.get("command", "")) as results:
             return results.publish(self)
 
     def draw(self, folder: Path) -> list[Path]:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotfem.results.columns import ShortTable, by_unit, described, largest, named, number
-from rotfem.results.files import csv_text, line, opened, whole_hdf5, write_text
+from rotfem.results.files import csv_text, whole_hdf5
 from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
 from rotfem.short import short_fields
 
@@ -247,54 +245,3 @@ def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
         return float(t[i]), float(y[i])
     s = -c[1] / (2 * c[0])
     return float(t[i] + s), float(np.polyval(c, s))
-
-
-class LiveTable:
-    """CSV file of a table that grows: what is new is written once a second, by one call of the system.
-
-    A disk that is full is no end: lines that fit are there, and the others are tried again the next time.
-
-    Args:
-        path: the file; one that is there is replaced.
-        table: the table, with the rows it starts with.
-
-    Attributes:
-        rows: how many rows are on disk.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-
-    def __init__(self, path: Path, table: Table):
-        self.path, self.table, self.rows = path, table, len(table)
-        self._size = len(write_text(path, csv_text(table.arrays())).read_bytes())
-        self._written, self._busy = monotonic(), False
-
-    def update(self) -> None:
-        """Write the rows that are new, if a second has passed since that was done."""
-        if monotonic() - self._written >= 1.0:
-            self.flush()
-
-    def flush(self) -> bool:
-        """Write the rows that are new; return whether all are on disk. May be called by a signal at any time."""
-        if self._busy:
-            return False
-        self._busy = True
-        try:
-            return self._append()
-        finally:
-            self._busy = False
-
-    def _append(self) -> bool:
-        self._written = monotonic()
-        data = "".join(map(line, self.table.rows(self.rows))).encode()
-        if not data:
-            return True
-        try:
-            with opened(self.path, os.O_WRONLY) as descriptor:
-                whole = data[: os.pwrite(descriptor, data, self._size)].rfind(b"\n") + 1
-                os.ftruncate(descriptor, self._size + whole)  # no line is left torn
-        except OSError:
-            return False
-        self._size, self.rows = self._size + whole, self.rows + data.count(b"\n", 0, whole)
-        return whole == len(data)

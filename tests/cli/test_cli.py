@@ -133,6 +133,22 @@ def test_bad_scenes(rotfem: Run, here: Path, what: str) -> None:
         rest = rest.split(word, 1)[1]
 
 
+def test_each_verb_has_a_folder_of_its_own(rotfem: Run, here: Path) -> None:
+    for verb in ("run", "modes", "check"):
+        assert rotfem(verb, "beam.toml", "-q", "--no-plots").returncode == 0
+    assert sorted(os.listdir(here / "results" / "beam")) == ["check", "modes", "run"]
+    assert "history.csv" in os.listdir(here / "results" / "beam" / "run")
+
+
+def test_a_folder_of_somebody_else_is_refused(rotfem: Run, here: Path) -> None:
+    """As that of the scene, whatever its files are called."""
+    for verb in ("run", "modes", "check"):
+        done = rotfem(verb, "beam.toml", "-o", ".", "--no-plots")
+        said = "output .: cannot be written: it holds beam.toml, and no results of rotfem; choose another folder"
+        assert (done.returncode, done.stderr) == (2, f"rotfem: {said} with -o DIR\n")
+    assert os.listdir(here) == ["beam.toml"]
+
+
 def test_missing_scene(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "bean.toml")
     assert done.returncode == 2
@@ -163,8 +179,8 @@ def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "beam.toml")
     assert done.returncode == 0, done.stderr
     assert "50 time steps" in done.stdout
-    assert "results/beam" in done.stdout
-    folder = here / "results" / "beam"
+    assert "results/beam/run" in done.stdout
+    folder = here / "results" / "beam" / "run"
     assert sorted(os.listdir(folder)) == FILES_OF_A_HISTORY
     history = read_csv(folder / "history.csv")
     assert list(history)[:7] == ["t", "psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha", "kinetic"]
@@ -210,7 +226,7 @@ def test_steady_state_without_time(rotfem: Run, here: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "steady state" in done.stdout
     assert "0.000514317" in done.stdout
-    assert sorted(os.listdir(here / "results/beam")) == [
+    assert sorted(os.listdir(here / "results/beam/run")) == [
         "fields.h5",
         "fields.xdmf",
         "history.csv",
@@ -229,7 +245,7 @@ def test_a_failed_computation_keeps_what_it_had(rotfem: Run, here: Path) -> None
     assert done.stdout == ""
     assert re.search(r"linear solution diverged.*3\.797\d* rad/s.*at t = (8\.9|9)\d* s.*consistent_linear", done.stderr)
     assert "Traceback" not in done.stderr
-    folder = here / "results" / "beam"
+    folder = here / "results" / "beam" / "run"
     assert sorted(os.listdir(folder)) == FILES_OF_A_HISTORY
     summary = json.loads((folder / "summary.json").read_text())
     history = read_csv(folder / "history.csv")
@@ -243,12 +259,12 @@ def test_json_of_a_failed_computation(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "beam.toml", "--json", "--no-plots", *DIVERGING)
     assert done.returncode == 3
     summary = json.loads(done.stdout)
-    assert summary == json.loads((here / "results/beam/summary.json").read_text())
+    assert summary == json.loads((here / "results/beam/run/summary.json").read_text())
     assert summary["status"] == "failed"
     assert "linear solution diverged" in summary["failure"]["what"]
     assert 8.5 < summary["failure"]["time"] < 9.5
     assert "consistent_linear" in summary["failure"]["advice"]
-    history = read_csv(here / "results/beam/history.csv")
+    history = read_csv(here / "results/beam/run/history.csv")
     assert history["t"][-1] == pytest.approx(summary["failure"]["time"] - 0.02)
     assert summary["figures"]["tip_u2_final"] == history["tip_u2"][-1]
 
@@ -282,9 +298,9 @@ main()
 def test_an_interrupted_run_keeps_what_it_had(rotfem: Run, here: Path, name: str) -> None:
     done = rotfem("run", "beam.toml", "--no-plots", code=SIGNALLED.format(name=name))
     assert done.returncode == 130
-    assert done.stderr.startswith("rotfem: interrupted; results until then are in results/beam; history.csv has 3")
+    assert done.stderr.startswith("rotfem: interrupted; results until then are in results/beam/run; history.csv has 3")
     assert done.stdout == ""
-    folder = here / "results" / "beam"
+    folder = here / "results" / "beam" / "run"
     assert sorted(os.listdir(folder)) == ["fields.h5", "fields.xdmf", "history.csv", "shape.csv", "summary.json"]
     assert json.loads((folder / "summary.json").read_text())["status"] == "interrupted"
     times = read_csv(folder / "history.csv")["t"]
