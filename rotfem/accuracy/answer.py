@@ -1,5 +1,4 @@
-"""A computed answer of a scene, its setting, and the distance of two answers (`rotfem.results.distance`).
-"""
+"""A computed answer of a scene, its setting, and the distance of two answers (`rotfem.results.distance`)."""
 
 from __future__ import annotations
 

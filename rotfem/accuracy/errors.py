@@ -75,7 +75,7 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
         own: of a history.
         end: of that, s.
     """
-    order = registry.schemes[own.scheme].order
+    order = order_of(own)
     if own.step is not None:
         if 2 * own.step > end:
             return None
@@ -110,15 +110,22 @@ def coarser(own: Setting, scene: Scene) -> Coarser | None:
     return None if both is None else Coarser(both.setting, min(both.factor, mesh.factor))
 
 
-def finer(own: Setting, scene: Scene) -> Setting:
+def finer(own: Setting) -> Setting:
     """Return the next finer setting, steps of half the length and twice the cells; of a mesh file a degree more."""
-    if own.elements is None:
-        out = replace(own, degree=own.degree + 1)
+    out, n = own, own.elements
+    if n is None:
+        out = replace(out, degree=own.degree + 1)
     else:
-        out = replace(own, elements=tuple(2 * n for n in own.elements) if isinstance(own.elements, tuple) else 2 * own.elements)
+        out = replace(out, elements=(2 * n[0], 2 * n[1]) if isinstance(n, tuple) else 2 * n)
     if own.step is not None:
         return replace(out, step=own.step / 2)
-    return out if own.tolerance is None else replace(out, tolerance=own.tolerance / 2 ** registry.schemes[own.scheme].order)
+    return out if own.tolerance is None else replace(out, tolerance=own.tolerance / 2 ** order_of(own))
+
+
+def order_of(setting: Setting) -> int:
+    """Return the order of the steps of a history."""
+    order: int = registry.schemes[str(setting.scheme)].order
+    return order
 
 
 # --- the error --------------------------------------------------------------------------------------------------------
@@ -171,9 +178,9 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         _compare(out, "time", answers, own, in_longer_steps(setting, scene.time.end))
         _compare(out, "space", answers, own, on_fewer_cells(setting, scene))
     else:
-        found = _compare(out, "discretisation", answers, own, other)
+        found = _compare(out, "discretisation" if setting.moving else "space", answers, own, other)
         if found is not None and other is not None:
-            _fill_table(out, scene, own, found, other)
+            _fill_table(out, own, found, other)
     if not registry.theories[setting.theory].exact:
         out.parts["model"] = of_theory(out, answers, own, (other or on_fewer_cells(setting, scene)).setting)
     return out
@@ -201,8 +208,8 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, other: Coars
             return found
         error += own.setting.tolerance  # which bounds the error of the steps by what the controller sums
     if isinstance(own.output, Spectrum):
-        out.each = [float(e / other.factor if e <= ASYMPTOTIC else e) for e in apart.each]
-        error = max(out.each, default=0.0)
+        each = [float(e / other.factor if e <= ASYMPTOTIC else e) for e in apart.each]
+        out.each, error = each, max(each, default=0.0)
     out.parts[name], out.at = error, apart.at if out.at is None else out.at
     return found
 
@@ -260,14 +267,14 @@ def row(setting: Setting, error: float | None, seconds: float, extrapolated: boo
     return {"setting": setting.summary(), "words": setting.words(), "error": error, "seconds": seconds, **more}
 
 
-def _fill_table(out: Errors, scene: Scene, own: Answer, other: Answer, how: Coarser) -> None:
-    error = out.parts["discretisation"]
+def _fill_table(out: Errors, own: Answer, other: Answer, how: Coarser) -> None:
+    error = out.total
     if error is None:
         return
     out.rows = [row(other.setting, distance(own, other).size, other.seconds), row(own.setting, error, own.seconds)]
     if how.factor > 1.0:
         growth = max(1.0, own.seconds / max(other.seconds, 1e-3))
-        out.rows.append(row(finer(own.setting, scene), error / (how.factor + 1.0), own.seconds * growth, True))
+        out.rows.append(row(finer(own.setting), error / (how.factor + 1.0), own.seconds * growth, True))
 
 
 # --- in words ---------------------------------------------------------------------------------------------------------
@@ -316,8 +323,10 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
             cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")
         elif own.tolerance is not None:
             cures.insert(0, f"time.tolerance = {rounded_down(own.tolerance * allowed / 2 / rest)}")
-        off = f"the tip may be in error by {percent(rest)} of its largest displacement" if own.moving else (
-            f"the result may be in error by {percent(rest)}"
+        off = (
+            f"the tip may be in error by {percent(rest)} of its largest displacement"
+            if own.moving
+            else (f"the result may be in error by {percent(rest)}")
         )
         said.append(f"{off}; to reduce it: {', '.join(cures)}, or --accuracy")
     return said

@@ -49,9 +49,7 @@ class Clock:
         announce: called with a line before every long answer; None for none.
     """
 
-    def __init__(
-        self, budget: float | None, agree: Callable[[float], float] = float, announce: Hint | None = None
-    ):
+    def __init__(self, budget: float | None, agree: Callable[[float], float] = float, announce: Hint | None = None):
         self.budget, self._agree, self._announce = budget, agree, announce or (lambda line: None)
         self.wanted: float | None = None
         self._started, self._began, self._compiling, self._next = cpu_time(), 0.0, Compiling.seconds, 1
@@ -184,11 +182,14 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
             if before is not None or len(found.rows) >= MOST_FAILURES:
                 break
             continue
-        errors = Errors({"discretisation": None}, list(model.unknown), answer.output.scale)
+        name = "discretisation" if setting.moving else "space"
+        errors = Errors({name: None}, list(model.unknown), answer.output.scale)
         if before is not None:
             there, q = distance(answer, before[1]), TOLERANCES[before[0]] / TOLERANCES[rung]
-            errors.parts["discretisation"] = reduced(there.size, apart, q)
+            errors.parts[name] = reduced(there.size, apart, q)
             errors.at, apart = there.at, there.size
+            if len(found.rows) == 1 and math.isfinite(apart):
+                found.rows[0]["error"] = apart  # that of the first, but for the error of this one
         errors.parts |= model.parts
         if (lost := answer.outcome.round_off) is not None:
             errors.parts["round_off"] = lost
