@@ -34,6 +34,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.newton import Newton
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def steady_state(
         if not (loose and (lost or growth.start is None)):
             raise
         raise ComputationError(
-            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {omega:g} rad/s: "
+            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {speed_text(omega)}: "
             "the load turns it, and no equilibrium was found that it turns to",
             advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
         ) from error
@@ -111,7 +112,9 @@ def _grown(system: Any, growth: LoadFactors, newton: Newton, notes: list[str]) -
     found = raised(system, growth, newton)
     if found.least < REGULAR_SHARE:
         if _compliance_lost(system, growth):
-            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: steps of the load were cut for ever")
+            raise ComputationError(
+                f"no steady state at {speed_text(growth.omega)}: steps of the load were cut for ever"
+            )
         system.count_rotations_from(found.reference)
         growth.set(system, 1.0)
         system.set_state(found.q)

@@ -31,7 +31,7 @@ from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST, Limits
 from rotfem.structures.mode_names import distinct, engineers_name
-from rotfem.units import split_unit
+from rotfem.units import speed_text, split_unit
 
 Array = npt.NDArray[Any]
 
@@ -238,15 +238,15 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
         )
     out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
-        f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
+        f"ambiguous: {labels[int(a['branch']) - 1]} at {speed_text(a['speed'])}, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
     ]
     out += [
-        f"{onset['kind']} from {onset['speed']:.8g} rad/s "
-        + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
+        f"{onset['kind']} from {speed_text(onset['speed'], 8)} "
+        + ("on" if onset["until"] is None else f"to {speed_text(onset['until'], 8)}")
         for onset in onsets
     ]
-    return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *doubtful(ends))]
+    return out + [f"at {speed_text(last.speed)}, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
 
 def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:

@@ -43,6 +43,7 @@ from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.structures.symmetry import inactive_unknowns
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -183,7 +184,7 @@ class Simulation:
         if said := stability.warning():
             if critical is not None and abs(speed) > critical:
                 said += (
-                    f"; {abs(speed):g} rad/s is above the speed {critical:.6g} rad/s at which the "
+                    f"; {speed_text(abs(speed))} is above the speed {speed_text(critical)} at which the "
                     f"{self.problem.theory.name} stiffness is singular"
                 )
             log.warnings.append(said)
@@ -258,9 +259,9 @@ class Simulation:
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
         watched = self.monitor
-        if status == "done" and watched.since is not None:
+        if status == "done" and watched.since is not None and watched.critical is not None:
             log.warnings.append(
-                f"the speed is above {watched.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is "
+                f"the speed is above {speed_text(watched.critical)}, where the {self.problem.theory.name} stiffness is "
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
         log.warnings += [lost] if (lost := watched.farthest.warning()) else []
