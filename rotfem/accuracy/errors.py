@@ -12,7 +12,7 @@ smooth. The error is the whole distance where that range is not shown:
 - the distance is above `ASYMPTOTIC`;
 - a vibration as quick as the difference d is out of phase by more than π/3, ω (ωh)² T/12 in steps h of second order
   (Hughes 1987, chapter 9), with ω² = ∫|ḋ|² dt / ∫|d|² dt; or the rows do not resolve it;
-- cells cannot be halved. Then the other answer has elements of one degree less.
+- cells cannot be halved. Then the other answer has elements of one degree less, or of one more where those lock.
 
 The error of a theory is the distance of the coarser answer to that of the richest theory.
 """
@@ -34,6 +34,9 @@ from rotfem.scene import Scene
 
 #: Relative distance of two answers up to which their order is taken to hold; phase error (rad) likewise.
 ASYMPTOTIC, IN_PHASE = 0.05, math.pi / 3
+
+#: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
+BEYOND = 0.75
 
 #: Order of steps that holds for all motions.
 CERTAIN = 2
@@ -62,10 +65,17 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Coarser:
-    """A setting to compare with, and the factor rᵖ − 1 by which the error is smaller than the distance to it."""
+    """A setting to compare with.
+
+    Attributes:
+        setting: in longer steps, on fewer cells.
+        factor: rᵖ − 1, by which the error is smaller than the distance.
+        instead: where that cannot be computed, as elements lock, a setting of one degree more.
+    """
 
     setting: Setting
     factor: float
+    instead: Setting | None = None
 
 
 def in_longer_steps(own: Setting, end: float) -> Coarser | None:
@@ -88,8 +98,8 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
     return Coarser(setting, ratio**CERTAIN - 1.0) if ratio > 1.1 else None
 
 
-def on_fewer_cells(own: Setting, scene: Scene) -> Coarser:
-    """Return a setting on half the cells, or of one degree less, or where elements of that lock, one more."""
+def on_fewer_cells(own: Setting) -> Coarser:
+    """Return a setting on half the cells, or of one degree less."""
     if own.elements is not None:
         cells = own.elements if isinstance(own.elements, tuple) else (own.elements,)
         half = tuple((n + 1) // 2 for n in cells)
@@ -97,17 +107,20 @@ def on_fewer_cells(own: Setting, scene: Scene) -> Coarser:
         if ratio >= 1.5:  # from three cells to two
             elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
             return Coarser(replace(own, elements=elements), ratio ** max(2, own.degree) - 1.0)
-    least = 2 if scene.structure.type == "plate" else 1
-    return Coarser(replace(own, degree=own.degree + (-1 if own.degree > least else 1)), 1.0)
+    lower, higher = (replace(own, degree=own.degree + more) for more in (-1, 1))
+    return Coarser(lower, 1.0, higher) if own.degree > 1 else Coarser(higher, BEYOND)
 
 
 def coarser(own: Setting, scene: Scene) -> Coarser | None:
     """Return a setting that is coarser in steps and mesh; None where steps cannot be longer."""
-    mesh = on_fewer_cells(own, scene)
+    mesh = on_fewer_cells(own)
     if not own.moving or scene.time is None:
         return mesh
-    both = in_longer_steps(mesh.setting, scene.time.end)
-    return None if both is None else Coarser(both.setting, min(both.factor, mesh.factor))
+    both, end = in_longer_steps(mesh.setting, scene.time.end), scene.time.end
+    if both is None:
+        return None
+    instead = None if mesh.instead is None else in_longer_steps(mesh.instead, end)
+    return Coarser(both.setting, min(both.factor, mesh.factor), None if instead is None else instead.setting)
 
 
 def finer(own: Setting) -> Setting:
@@ -176,13 +189,13 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     other = coarser(setting, scene)
     if parts and setting.moving and scene.time is not None:
         _compare(out, "time", answers, own, in_longer_steps(setting, scene.time.end))
-        _compare(out, "space", answers, own, on_fewer_cells(setting, scene))
+        _compare(out, "space", answers, own, on_fewer_cells(setting))
     else:
         found = _compare(out, "discretisation" if setting.moving else "space", answers, own, other)
         if found is not None and other is not None:
             _fill_table(out, own, found, other)
     if not registry.theories[setting.theory].exact:
-        out.parts["model"] = of_theory(out, answers, own, (other or on_fewer_cells(setting, scene)).setting)
+        out.parts["model"] = of_theory(out, answers, own, (other or on_fewer_cells(setting)).setting)
     return out
 
 
@@ -193,6 +206,9 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, other: Coars
         out.unknown.append("there are too few steps to take steps of twice the length")
         return None
     found, why = attempt(answers, other.setting)
+    if found is None and other.instead is not None:  # elements of a lower degree lock
+        found, _ = attempt(answers, other.instead)
+        other = Coarser(other.instead, BEYOND)
     if found is None:
         out.unknown.append(f"with {other.setting.words()} the computation fails: {why}")
         return None
@@ -200,7 +216,7 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, other: Coars
     if not math.isfinite(apart.size):
         out.unknown.append("nothing moves, where it does with a coarser setting")
         return found
-    holds = apart.size <= ASYMPTOTIC and in_phase(own, found, answers.scene)
+    holds = other.factor < 1.0 or (apart.size <= ASYMPTOTIC and in_phase(own, found, answers.scene))
     error = apart.size / other.factor if holds else apart.size
     if name != "space" and own.outcome.steps > 0 and found.outcome.steps > FEWER * own.outcome.steps:
         if own.setting.tolerance is None:

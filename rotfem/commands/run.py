@@ -6,6 +6,7 @@ A run is the compiled system, what yields its states, the observers that see the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -424,7 +425,8 @@ def simulate(
         result = simulation.run(progress)
         if not scene.output.error:
             return result
-        own = Answer(Setting.of(scene), simulation, cpu_time() - Compiling.seconds - began)
+        degree = simulation.system.V.element.basix_element.degree  # a default differs by cell
+        own = Answer(replace(Setting.of(scene), degree=degree), simulation, cpu_time() - Compiling.seconds - began)
         answers.keep(own)
         shown(result)
         started = perf_counter()
