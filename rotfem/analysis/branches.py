@@ -180,19 +180,18 @@ class Sweep:
     Args:
         analysis: compiled scene.
         count: number of branches.
-        most: speeds that may be solved; those asked for are in any case.
 
     Attributes:
         known: speed ↦ modes there that are solved already.
         each: (items, work) ↦ what the work makes of every item; processes may share them out.
     """
 
-    def __init__(self, analysis: ModalAnalysis, count: int, most: float = np.inf):
+    def __init__(self, analysis: ModalAnalysis, count: int):
         self.analysis, self.count = analysis, count
         self.known: dict[float, Spinning] = {}
         self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
         self.points: list[SpeedPoint] = []
-        self.solves, self.most_solves, self.unresolved = 0, most, False
+        self.solves, self.most_solves, self.unresolved = 0, 0, False
         self.ambiguous: list[dict[str, float]] = []
 
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> SpeedPoint:
@@ -209,7 +208,7 @@ class Sweep:
         first.conjugate = np.zeros(total, dtype=bool)
         self.points = [first]
         self.finest = 1e-5 * max(speeds[-1] - speeds[0], 1e-300)  # a narrower veering passes as a crossing
-        self.most_solves = min(self.most_solves, 1000 + 41 * len(speeds))  # a veering takes 17
+        self.most_solves = 1000 + 41 * len(speeds)  # a veering takes 17
         for i, speed in enumerate(speeds[1:], start=1):
             if speeds[i - 1] < 0.0 < speed:  # where the lines ω = k|Ω| have a kink
                 self._advance(self.solve(0.0, self.points[-1].spinning, False))

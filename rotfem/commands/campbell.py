@@ -29,42 +29,38 @@ from rotfem.mechanics.effects import Work
 from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.values import LARGEST, Limits
+from rotfem.scene.values import LARGEST
 from rotfem.structures.mode_names import distinct, engineers_name
 from rotfem.units import speed_text, split_unit
 
 Array = npt.NDArray[Any]
 
 
-def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
+def parse_speeds(text: str) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
 
     Args:
         text: what was asked for.
-        limits: of the scene; the usual ones if None.
 
     Raises:
-        SceneError: the text is neither, the speeds do not increase, or are too many.
+        SceneError: the text is neither, or the speeds do not increase.
     """
-    limits = limits or Limits()
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
     )
-    speeds, why = list[float](), None
+    speeds = list[float]()
     with suppress(ValueError):
         numbers, unit = split_unit(text)
         if ":" in numbers:
             first, last, number = numbers.split(":")
             ends, count = (float(first) * unit, float(last) * unit), int(number)
-            why = limits.refusal("speeds", count)
-            if why is None and max(map(abs, ends)) <= LARGEST:
+            if max(map(abs, ends)) <= LARGEST:
                 speeds = [float(s) for s in np.linspace(*ends, count)]
         else:
             speeds = [float(s) * unit for s in numbers.split(",")]
-            why = limits.refusal("speeds", len(speeds))
-    if why or len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
-        raise SceneError("command line", "--speeds", text, why or allowed)
+    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, allowed)
     return speeds
 
 
@@ -108,7 +104,7 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds)
     scene = scene.replace(marks) if marks else scene
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
-    values = parse_speeds(text, scene.limits)
+    values = parse_speeds(text)
 
     def compute(variant: Scene) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
@@ -139,7 +135,7 @@ def diagram(
     hints = hints_of(analysis, scene, hint, fastest)
     reduced = in_basis(analysis, values, count + SPARE)
     analysis = reduced or analysis
-    sweep = Sweep(analysis, count, scene.limits.speeds)
+    sweep = Sweep(analysis, count)
     if analysis.everyone.size > analysis.comm.size:  # each process has a copy
         if reduced is None:
             sweep.known = solved_by_all(analysis, values, count, progress)

@@ -37,12 +37,6 @@ def run(
         raise SceneError("command line", "--error", error, 'must be "parts"')
     every = None if checkpoint is None else interval(checkpoint)
     store = RunStore(todo.session.comm, todo.results, every, resume)
-    if resume and (summary := store.finished(todo.scene)):
-        todo.session.print_json(summary)
-        todo.session.say(
-            [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
-        )
-        return
     hint = todo.hint if todo.scene.accuracy is None else todo.session.bar.says
     shown, parts = todo.show, error is not None
     todo.finish(simulate(todo.scene, store, todo.progress, hint, shown=shown, parts=parts))
