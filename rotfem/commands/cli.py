@@ -25,21 +25,21 @@ def run(
         str | None, typer.Option("--checkpoint", metavar="EVERY", help="write checkpoints: every 30s, or 500 steps")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on from the checkpoint in the result folder")] = False,
+    error: Annotated[
+        str | None, typer.Option("--error", metavar="parts", help="errors of steps and mesh one by one")
+    ] = None,
 ) -> None:
     """Compute the steady state or the time history of SCENE."""
     from rotfem.commands.run import simulate
     from rotfem.commands.run_store import RunStore, interval
 
+    if error not in (None, "parts"):
+        raise SceneError("command line", "--error", error, 'must be "parts"')
     every = None if checkpoint is None else interval(checkpoint)
     store = RunStore(todo.session.comm, todo.results, every, resume)
-    if resume and (summary := store.finished(todo.scene)):
-        todo.session.print_json(summary)
-        todo.session.say(
-            [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
-        )
-        return
     hint = todo.hint if todo.scene.accuracy is None else todo.session.bar.says
-    todo.finish(simulate(todo.scene, store, todo.progress, hint))
+    shown, parts = todo.show, error is not None
+    todo.finish(simulate(todo.scene, store, todo.progress, hint, shown=shown, parts=parts))
 
 
 @command()
