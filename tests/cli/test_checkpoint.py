@@ -175,9 +175,6 @@ def test_killed_and_resumed(folder: Path, rotfem: Any) -> None:
     assert done.status == 0, done.err
     assert difference(read_csv("cut/history.csv"), read_csv("whole/history.csv")) < 1e-9
     assert summary("cut")["resumed"] == [{"time": 0.3, "ranks": 1}]
-    again = rotfem("run", "beam.toml", "--no-plots", "-o", "cut", "--resume")
-    assert again.status == 0
-    assert "holds the finished run already" in again.out
 
 
 def test_an_interrupted_run_goes_on_from_the_step_it_was_in(folder: Path, rotfem: Any) -> None:
