@@ -130,7 +130,7 @@ def identity_of(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, An
     content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
     tables: Tree = json.loads(json.dumps(scene.digest(), default=str))
     tables.get("time", {}).pop("end", None)
-    tables = {key: value for key, value in tables.items() if key not in ("name", "limits")}
+    tables.pop("name", None)
     return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
 
 
