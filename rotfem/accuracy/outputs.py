@@ -1,4 +1,8 @@
-"""The outputs that answers are compared by: the displacement of the tip, or the moment at the root."""
+"""The outputs that answers are compared by: the displacement of the tip, the moment at the root, modes.
+
+The tip is a section, whose points are displaced by u + θ × d, d their distance from its axis. With d a radius of
+gyration r the output is (u, r θ): a rotation counts by what it displaces.
+"""
 
 from __future__ import annotations
 

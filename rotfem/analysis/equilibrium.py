@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.analysis.conditioning import KNOWN, rounded_compliance
 from rotfem.analysis.load_steps import (
     REGULAR_SHARE,
     SMALLEST_SHARE,
@@ -25,7 +26,6 @@ from rotfem.analysis.load_steps import (
     raised,
     richest_advice,
 )
-from rotfem.analysis.theory_error import KNOWN, rounded_compliance
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError

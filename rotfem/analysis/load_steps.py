@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.theory_error import KNOWN, conditioning
+from rotfem.analysis.conditioning import KNOWN, conditioning
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest

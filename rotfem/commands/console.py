@@ -72,6 +72,7 @@ class Session:
         self.bar = ProgressBar()
         self._folder: ResultFolder | None = None
         self._made: list[Path] = []
+        self._warned = 0
 
     def __enter__(self) -> Session:
         for stream in (sys.stdout, sys.stderr):
@@ -177,10 +178,11 @@ class Session:
         """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
         return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
 
-    def finish(self, result: Result, plots: bool, further: Sequence[Writer] = ()) -> None:
+    def finish(self, result: Result, plots: bool, further: Sequence[Writer] = (), last: bool = True) -> None:
         """Write a result, its figures and what else is wanted; print its summary if --json asks, or its report.
 
-        Of a computation that has failed nothing but warnings is reported.
+        Of a computation that has failed nothing but warnings is reported. If it is not the last word, the error is
+        still to come (see `complete`).
 
         Raises:
             OutputError: a file cannot be written; those that can are.
@@ -192,14 +194,38 @@ class Session:
         self.bar.describe("writing results and figures")
         problems = self._folder.write(result, plots, further)
         self.bar.stop()
-        self.print_json(result.summary)
-        if not self.quiet:
-            for warning in result.summary["warnings"]:
-                self.remark(f"warning: {warning}")
+        if last:
+            self.print_json(result.summary)
+        self._warn(result)
         if problems:
             raise problems[0]
         if result.status == "done":
             self.say([*report(result), f"results in {self._folder.path}"])
+
+    def complete(self, result: Result, further: Sequence[Writer] = ()) -> None:
+        """Write the summary of a result again, now with its error, and what else is wanted; print the error.
+
+        Raises:
+            OutputError: a file cannot be written.
+            SceneError: something further cannot be made.
+        """
+        from rotfem.commands.printed import of_error
+
+        assert self._folder is not None
+        folder = self._folder
+        problems = folder.add(result, further)
+        self.print_json(result.summary)
+        self._warn(result)
+        if problems:
+            raise problems[0]
+        self.say(of_error(result.summary))
+
+    def _warn(self, result: Result) -> None:
+        """Print the warnings of a result that have not been printed."""
+        if not self.quiet:
+            for warning in result.summary["warnings"][self._warned :]:
+                self.remark(f"warning: {warning}")
+        self._warned = len(result.summary["warnings"])
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.conditioning import Farthest
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
-from rotfem.analysis.theory_error import Farthest
 from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations

@@ -39,7 +39,7 @@ SELDOM = 50
 REMEMBERED = {
     "log": ("steps", "warnings", "resumed"),
     "monitor": ("since", "stability"),
-    "monitor.farthest": ("seen", "first"),
+    "monitor.farthest": ("seen",),
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
@@ -51,11 +51,7 @@ REMEMBERED = {
 
 @dataclass
 class Memory:
-    """The parts of a run that a checkpoint is of; without a stepper nothing can be kept.
-
-    Attributes:
-        setting: of the accuracy that the run is an answer for; None without one.
-    """
+    """The parts of a run that a checkpoint is of; without a stepper nothing can be kept."""
 
     time: Time
     system: Any
@@ -63,7 +59,6 @@ class Memory:
     record: Recorder
     monitor: Monitor
     log: Log
-    setting: Any = None
 
     def parts(self) -> dict[str, Any]:
         """Return the parts of `REMEMBERED` that there are, by name."""
@@ -90,7 +85,6 @@ class Memory:
             "t": state.t,
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
             "rows": np.array(self.record.history.rows()).reshape(len(self.record.history), -1),
-            "setting": self.setting,
             "processes": self.system.comm.gather(own),
         }
 
@@ -209,10 +203,6 @@ class RunStore:
         """Whether there is a checkpoint to go on from."""
         return self._tree is not None
 
-    def setting(self) -> Any:
-        """Return the setting of the run that goes on, which an accuracy has led to; None without."""
-        return None if self._tree is None else self._tree["setting"]
-
     def open(self, scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> None:
         """Read the checkpoint that the run is to go on from, and see that it is one of this run.
 
@@ -229,6 +219,8 @@ class RunStore:
         option = "--resume" if self.resume else "--checkpoint"
         if scene.time is None:
             raise SceneError("command line", option, None, "needs a scene with [time]; a steady state has no steps")
+        if scene.accuracy is not None:
+            raise SceneError("command line", option, None, "cannot be combined with accuracy: it takes several answers")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
         self._identity, path, end = identity_of(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end

@@ -166,6 +166,12 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         self.first_does(lambda: self.summarise(result.summary))
         return problems
 
+    def add(self, result: Result, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
+        """Write the summary of a result that is written already, and what else is wanted; return what went wrong."""
+        found = [self._problem(write, False) for write in further]
+        self.first_does(lambda: self.summarise(result.summary))
+        return [problem for problem in found if problem is not None]
+
     def _problem(self, write: Writer, together: bool) -> OutputError | SceneError | None:
         """Write files on rank 0, or on all ranks together; return the error of the first rank that has one."""
         problem = None

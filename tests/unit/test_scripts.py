@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -54,20 +53,6 @@ def test_representations_are_short() -> None:
         assert len(repr(thing)) < 500, type(thing)
         assert len(str(thing)) < 500, type(thing)
     assert repr(problem().structure).startswith("PlanarBeamStructure(length=10.0, section=PlanarSection(EA=28000000.0")
-
-
-# --- signatures -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["PlanarBeam", "SpatialBeam", "Plate", "BeamMesh", "PlateMesh"])
-def test_signatures_have_the_keys_that_a_script_gives(name: str) -> None:
-    """From the first use of a table on, or when it is asked for its keys."""
-    table = getattr(rotfem, name)
-    table.model_rebuild()
-    parameters = inspect.signature(table).parameters
-    assert list(parameters) == list(table.model_fields)
-    for key, field in table.model_fields.items():
-        assert (parameters[key].default is inspect.Parameter.empty) == field.is_required()
 
 
 # --- units ------------------------------------------------------------------------------------------------------------
