@@ -2,7 +2,7 @@
 
 import sys
 
-from rotfem.commands.interrupts import held_back
+from rotfem.commands.interrupts import importing
 
 
 def main() -> None:
@@ -11,7 +11,7 @@ def main() -> None:
     Typer is imported without rich, which takes longer than all the rest and puts backslashes into the helps.
     """
     try:
-        with held_back():
+        with importing():
             sys.modules["rich"] = None  # type: ignore[assignment]
             import typer  # noqa: F401
 

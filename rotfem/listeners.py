@@ -1,10 +1,14 @@
-"""What hears of a computation while it goes on, and the time that it takes."""
+"""What hears of a computation while it goes on, the time that it takes, and who computes it where there is no MPI."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
 from time import process_time
+from types import SimpleNamespace
+
+#: In the place of an MPI communicator where there is one process.
+ONE_PROCESS = SimpleNamespace(rank=0, size=1, bcast=lambda value: value, allgather=lambda value: [value])
 
 #: Takes the share of the work done, between 0 and 1.
 Progress = Callable[[float], None]

@@ -5,10 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
+from contextvars import ContextVar
 from functools import cache, lru_cache
 from typing import Any
 
 from rotfem.errors import InputError, SceneError
+
+#: Unit in which messages show angular speeds besides rad/s.
+SPEED: ContextVar[str] = ContextVar("SPEED", default="rad/s")
 
 _NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 #: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
@@ -97,6 +101,12 @@ def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") ->
         if 0.0 < (value := float(number) * unit) < 1e9:
             return value
     raise SceneError(file, key, text, "must be a time greater than 0, such as 60s, 2min or 1h")
+
+
+def speed_text(omega: float, digits: int = 6) -> str:
+    """Return an angular speed (rad/s) as messages have it: "3.8 rad/s", or "3.8 rad/s (36.3 rpm)"."""
+    text, unit = f"{omega:.{digits}g} rad/s", SPEED.get()
+    return text if unit == "rad/s" else f"{text} ({omega / quantity(f'1 {unit}', 'rad/s'):.{digits}g} {unit})"
 
 
 def shown(unit: str) -> str:

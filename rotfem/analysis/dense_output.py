@@ -26,29 +26,33 @@ from rotfem.analysis.time_grid import CLOSE
 KNOWN = 0.5
 
 
+def multiples(interval: float, end: float) -> Array:
+    """Return 0, the multiples of an interval (s) before the end (s), and the end."""
+    return np.append(np.arange(int(np.ceil(end / interval - CLOSE))) * interval, end)
+
+
 class RowTimes:
-    """Interpolates the steps of a march at multiples of an interval and at the end.
+    """Interpolates the steps of a march at given times.
 
     Args:
-        interval: from one row to the next, s.
-        end: last time, s.
+        times: increasing, s; those up to the start of the march are passed over.
         order: of the scheme that steps.
         comm: MPI communicator of the processes that share the unknowns.
-        passed: number of rows so far, without that at t = 0.
+        start: of the march, s.
     """
 
-    def __init__(self, interval: float, end: float, order: int, comm: MPI.Comm, passed: int = 0):
-        self.interval, self.end, self.order, self.comm = interval, end, order, comm
-        self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
+    def __init__(self, times: Array, order: int, comm: MPI.Comm, start: float = 0.0):
+        self.times, self.order, self.comm = times, order, comm
+        self._close = CLOSE * float(np.diff(times).min(initial=np.inf)) if len(times) > 1 else 0.0
+        self._next = int(np.searchsorted(times, start + self._close, side="right"))
         self._reached: list[State] = []
 
     def __call__(self, old: State, new: State, leg: Any) -> None:
         """Find the rows in a step from an old to a new state."""
-        close, times = CLOSE * self.interval, []
-        while self._next <= self._last and (t := min(self._next * self.interval, self.end)) <= new.t + close:
-            times.append(t)
-            self._next += 1
-        ends = [new] if times and times[-1] > new.t - close else []
+        end = int(np.searchsorted(self.times, new.t + self._close, side="right"))
+        times = list(map(float, self.times[self._next : end]))
+        self._next = max(end, self._next)
+        ends = [new] if times and times[-1] > new.t - self._close else []
         self._reached += between(old, new, times[: len(times) - len(ends)], self.order, self.comm) + ends
 
     def taken(self) -> list[State]:

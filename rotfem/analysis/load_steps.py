@@ -10,18 +10,20 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.theory_error import KNOWN, conditioning
+from rotfem.analysis.conditioning import KNOWN, conditioning
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
-from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.linear import DirectSolver, negative_count
 from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.reference_rotation import BeyondReach
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
-#: A continuation that must cut its steps below this share of the whole has met a limit point.
-SMALLEST_SHARE = 1e-3
+#: Smallest step, as a part of the whole load: within it bends the path of a column with an imperfection of 3e-7 of its
+#: buckling load. One that a regular equilibrium asks for.
+SMALLEST_SHARE, REGULAR_SHARE = 1e-5, 1e-3
 
 
 def less(system: System) -> str:
@@ -51,12 +53,14 @@ class Raised:
     Attributes:
         q: the equilibrium at full load, a local dof array.
         reference: what its rotations are counted from.
-        sure: whether it is the one of the growing load; not, where Newton's method wandered to it.
+        critical: first share of the load at which the stiffness gets a negative eigenvalue; None without one.
+        least: smallest step that was tried, as a part of the whole load.
     """
 
     q: Array
     reference: Any
-    sure: bool = True
+    critical: float | None = None
+    least: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -104,60 +108,69 @@ class LoadFactors:
 
     def where(self, share: float) -> str:
         """Return a share of the load in words, with its speed where that grows."""
-        speed = f" ({self.speed(share):.4g} rad/s)" if self.omega and self.spin[0] != self.spin[1] else ""
+        speed = f" ({speed_text(self.speed(share), 4)})" if self.omega and self.spin[0] != self.spin[1] else ""
         return f"{share:.6g} of the load{speed}"
 
 
 def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     """Return the equilibrium at full load, in one step or by halved ones.
 
-    Where there are several equilibria, a way that wanders may end at any of them. Then smaller steps are taken, whose
-    ways do not, and where the load cannot be raised by them, the first equilibrium that was found is returned.
+    Where there are several equilibria, a step may end at any of them. So a step is halved, too, where an increment of
+    Newton's method was beyond its tangent, where the step turns back on the one before, or where the stiffness gets a
+    negative eigenvalue (Sylvester): then it has passed a critical point, or left the path. What remains of that at the
+    smallest step is a bifurcation of the path itself, beyond which it is unstable and no further ones are looked for.
 
     Raises:
         ComputationError: none was found; says how far the load got.
     """
-    q, done, share = growth.begin(system), 0.0, 1.0
-    reference = system.reference
-    other: Raised | None = None
+    q, done, share, least = growth.begin(system), 0.0, 1.0, 1.0
+    reference, critical, before = system.reference, None, None
     while done < 1.0:
-        target = min(1.0, done + share)
+        target, afresh = min(1.0, done + share), False
         try:
             new = balance(system, growth, target, q, newton)
             wandered = newton.wandered
+            negative = negative_count(system.tangent(1.0, 0.0, 0.0)[0], sure=True) or 0
             new = counted(system, growth, target, new, newton)
         except BeyondReach as error:
             turns = system.structure.turns
             failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
         except ComputationError as error:
-            failure, afresh = error.what, False
+            failure = error.what
         else:
-            if not wandered:
-                q, done, share, reference = new, target, 1.5 * share, system.reference
+            moved = system.size(system.structure.total(new)) > newton.tolerance  # else it has one state at all speeds
+            crossed = moved and critical is None and negative > 0
+            way = new - q if system.reference is reference else None
+            turned = way is not None and before is not None and system.product(way, before) < 0.0
+            if not wandered and (not (crossed or turned) or share < 2 * SMALLEST_SHARE):
+                critical = target if crossed else critical
+                q, done, share, reference, before = new, target, 2 * share, system.reference, way
                 continue
-            failure, afresh = "Newton's way was a long one", False
-            if other is None and target == 1.0:
-                other = Raised(new, system.reference, False)
+            failure = "the next one is not near it"
         share /= 2
+        least = min(least, share)
         if share < SMALLEST_SHARE:
-            if other is not None:
-                return other
-            system.count_rotations_from(reference)
-            system.set_state(q)
-            stretch = system.model.stretches()[1]
-            if stretch >= 2.0:
-                failure = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
-            raise ComputationError(
-                f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; "
-                f"{failure}",
-                advice=less(system),
-            )
+            raise _ended(system, growth, q, done, failure, reference)
         system.count_rotations_from(reference)
         if afresh:
             q, _ = recounted(system, q)
             reference = system.reference
     system.structure.check_range(q)
-    return Raised(np.asarray(q), reference)
+    return Raised(np.asarray(q), reference, critical, least)
+
+
+def _ended(
+    system: System, growth: LoadFactors, q: Array, done: float, failure: str, reference: Any
+) -> ComputationError:
+    """Return the error of a load that could be raised no further than to a share, with the equilibrium q there."""
+    system.count_rotations_from(reference)
+    system.set_state(q)
+    stretch = system.model.stretches()[1]
+    why = f"beyond it the structure snaps, or there is none ({failure})"
+    if stretch >= 2.0:
+        why = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
+    what = f"no steady state at {speed_text(growth.omega)}: the last equilibrium was at {growth.where(done)}; {why}"
+    return ComputationError(what, advice=less(system))
 
 
 def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
@@ -239,7 +252,7 @@ def balance(
     increment = limited(system, q, correction)
     if system.linear:
         if not np.isfinite(increment()) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
-            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: the stiffness is singular")
+            raise ComputationError(f"no steady state at {speed_text(growth.omega)}: the stiffness is singular")
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))

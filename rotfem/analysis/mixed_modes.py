@@ -24,7 +24,6 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csr_array
 
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
@@ -244,8 +243,9 @@ def scale(pencil: Pencil, rest: Any, factors: Any, unit: float) -> None:
     first.array[n:] = 0.0
     rows.diagonalScale(None, first)
     indptr, indices, data = rows.getValuesCSR()
-    shape = len(indptr) - 1, rows.getSize()[1]
-    strains = csr_array((data, indices, indptr), shape=shape).max(axis=1).toarray().ravel()[n:]
+    largest = np.zeros(len(indptr) - 1)  # of each row
+    np.maximum.at(largest, np.repeat(np.arange(len(largest)), np.diff(indptr)), data)
+    strains = largest[n:]
     d.array[n:] = power_of_two(1.0 / np.where(strains > 0.0, strains, 1.0))
     pencil.unknowns, pencil.pivots, pencil.unit, pencil.factors = d, True, unit, factors
     pencil.sizes = np.zeros(d.getLocalSize())

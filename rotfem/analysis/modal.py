@@ -196,11 +196,13 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
-        past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
-        notes: remarks on these paths.
+        notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
+        is_model: whether it is a model of itself between speeds (see `rotfem.analysis.branches.Model`).
     """
+
+    is_model = False
 
     def __init__(
         self,
@@ -220,7 +222,7 @@ class ModalAnalysis:
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)
-        self.past_limits, self.notes = False, list[str]()
+        self.notes = list[str]()
         self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -255,13 +257,8 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        matrices = self.system.mass_damping_stiffness(keep)
-        if self.fixed is not None:
-            matrices = self.fixed(matrices, speed)
-        clamped = Pencil(*matrices)
-        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        pencil, clamped = self._pencils(speed, keep)
         t2 = perf_counter()
-        clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.near, pencil.factor = near, self.system.analysed
@@ -287,6 +284,25 @@ class ModalAnalysis:
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
         return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
+
+    def _pencils(self, speed: float, keep: bool) -> tuple[Pencil, Pencil]:
+        """Return the pencil at the state and speed (rad/s) that are set, and the same with the hub held."""
+        matrices = self.system.mass_damping_stiffness(keep)
+        if self.fixed is not None:
+            matrices = self.fixed(matrices, speed)
+        clamped = Pencil(*matrices)
+        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        clamped.unit = pencil.unit = self._unit
+        return pencil, clamped
+
+    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool) -> Spinning:
+        """Return what `at` has found at a speed (rad/s): equilibrium q, pairs, and whether the hub turns freely."""
+        held = self.system.held
+        held.set_time(0.0, held.motion.at_speed(speed))
+        held.set_state(q)
+        pencil, clamped = self._pencils(speed, keep=True)
+        clamped.owner = pencil.owner = self
+        return Spinning(speed, q, pencil, pairs, clamped, rigid)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
@@ -323,7 +339,7 @@ class ModalAnalysis:
         if start is not None:
             s.count_rotations_from(start.reference)
         first = None if start is None else start.q
-        return steady_state(s, speed, self.newton, first, self.past_limits, self.notes)
+        return steady_state(s, speed, self.newton, first, self.notes)
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of how the modes were solved; nothing special here."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import logging
 import os
-import re
 import shutil
 import signal
 import sys
@@ -19,20 +18,19 @@ from importlib.util import find_spec
 from pathlib import Path
 from textwrap import wrap
 from time import monotonic, sleep
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
+from rotfem import units
 from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
+from rotfem.listeners import ONE_PROCESS
 
 if TYPE_CHECKING:
+    from rotfem.results import Result
     from rotfem.results.result_set import ResultFolder, Writer
 
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
-
-#: A number with the unit of angular speeds.
-ANGULAR = re.compile(r"(\d[\d.]*(?:e[-+]?\d+)?) rad/s(?!²)")
 
 #: Whether commands run on this process alone, whatever others mpirun has started.
 ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
@@ -60,31 +58,33 @@ class Session:
     It prints JSON of the summary and nothing else on stdout, errors only if it is quiet, and tracebacks to debug.
 
     Attributes:
-        speed_unit: unit in which the user gives speeds.
         bar: progress of the computation.
     """
 
-    def __init__(self, as_json: bool, quiet: bool, debug: bool):
-        self.comm: Any = SimpleNamespace(rank=0, size=1, bcast=lambda value: value, allgather=lambda value: [value])
+    def __init__(self, as_json: bool = False, quiet: bool = False, debug: bool = False):
+        self.comm: Any = ONE_PROCESS
         with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
             from mpi4py import MPI
 
             self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
-        self.bar, self.speed_unit = ProgressBar(), "rad/s"
+        self.bar = ProgressBar()
         self._folder: ResultFolder | None = None
         self._made: list[Path] = []
+        self._warned = 0
 
     def __enter__(self) -> Session:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")  # not every terminal has every letter
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        self._unit = units.SPEED.set("rad/s")
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.bar.stop()
+        units.SPEED.reset(self._unit)
         if self._folder is not None:
             self._folder.close(error)
         if error is not None:  # remove the folders that this command made, the innermost first, if they are empty
@@ -126,44 +126,28 @@ class Session:
         """Return where results are of a command that did not end well, and how it goes on; empty where none are."""
         from rotfem.results.result_set import kept_in
 
-        if self._folder is None or self._folder.set is None:
+        if self._folder is None:
             return ""
         path = self._folder.path
         if (path / "cost.jsonl").exists():
             return f"; what was measured is in {path}, and the same command goes on from there"
-        found = kept_in(path) if self._folder.set.begun else []
+        found = kept_in(path) if self._folder.summary else []
         return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
 
     def _end(self, message: str, status: int, alone: bool = False) -> NoReturn:
         """End this process, at once where the others may be waiting for it, or gone."""
-        self._error(f"rotfem: {message}")
+        self.remark(f"rotfem: {message}")
         if alone:
             os._exit(status)
         raise SystemExit(status) from None
 
-    def _error(self, line: str) -> None:
-        if self.first:
-            self.bar.stop()
-            print(fitted(self._in_unit(line), sys.stderr), file=sys.stderr, flush=True)
-
-    def _in_unit(self, line: str) -> str:
-        """Return a line with its angular speeds in the unit of the scene, too."""
-        unit = self.speed_unit
-        if unit == "rad/s":
-            return line
-        from rotfem.results.columns import in_unit
-
-        return ANGULAR.sub(lambda found: f"{found[0]} ({in_unit(float(found[1]), unit):.6g} {unit})", line)
-
     def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
-        """Return the result folder, made and locked; say so if the command before was killed there."""
+        """Return the result folder, made where it is not there."""
         from rotfem.results.result_set import ResultFolder
 
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
         self._folder = ResultFolder(self.comm, path, command, inputs)
-        if self._folder.set is not None and self._folder.set.before and not self.quiet:
-            self.remark(f"warning: {self._folder.set.before}")
         return self._folder
 
     def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
@@ -174,25 +158,31 @@ class Session:
         if reason:
             raise SceneError("command line", option, str(path), reason)
 
-    def start(self, title: str) -> None:
-        """Begin to show progress: by a bar on a terminal, elsewhere by lines of a long computation."""
-        speaks = self.first and not self.quiet and not self.as_json
-        self.bar = ProgressBar(title, speaks and sys.stderr.isatty(), speaks)
+    def start(self, title: str, unit: str = "rad/s") -> None:
+        """Begin to show progress.
+
+        Args:
+            title: of the computation.
+            unit: of speeds in messages.
+        """
+        units.SPEED.set(unit)
+        self.bar = ProgressBar(title, self.first and not self.quiet and not self.as_json)
         self.bar.start()
 
     def remark(self, line: str) -> None:
         """Print a line on stderr, above the bar."""
         if self.first:
-            self.bar.says(self._in_unit(line), always=True)
+            self.bar.print(line)
 
     def hint(self, unwanted: bool) -> Callable[[str], None] | None:
         """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
         return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
 
-    def finish(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
+    def finish(self, result: Result, plots: bool, further: Sequence[Writer] = (), last: bool = True) -> None:
         """Write a result, its figures and what else is wanted; print its summary if --json asks, or its report.
 
-        Of a computation that has failed nothing but warnings is reported.
+        Of a computation that has failed nothing but warnings is reported. If it is not the last word, the error is
+        still to come (see `complete`).
 
         Raises:
             OutputError: a file cannot be written; those that can are.
@@ -204,14 +194,38 @@ class Session:
         self.bar.describe("writing results and figures")
         problems = self._folder.write(result, plots, further)
         self.bar.stop()
-        self.print_json(result.summary)
-        if not self.quiet:
-            for warning in result.summary["warnings"]:
-                self._error(f"warning: {warning}")
+        if last:
+            self.print_json(result.summary)
+        self._warn(result)
         if problems:
             raise problems[0]
         if result.status == "done":
             self.say([*report(result), f"results in {self._folder.path}"])
+
+    def complete(self, result: Result, further: Sequence[Writer] = ()) -> None:
+        """Write the summary of a result again, now with its error, and what else is wanted; print the error.
+
+        Raises:
+            OutputError: a file cannot be written.
+            SceneError: something further cannot be made.
+        """
+        from rotfem.commands.printed import of_error
+
+        assert self._folder is not None
+        folder = self._folder
+        problems = folder.add(result, further)
+        self.print_json(result.summary)
+        self._warn(result)
+        if problems:
+            raise problems[0]
+        self.say(of_error(result.summary))
+
+    def _warn(self, result: Result) -> None:
+        """Print the warnings of a result that have not been printed."""
+        if not self.quiet:
+            for warning in result.summary["warnings"][self._warned :]:
+                self.remark(f"warning: {warning}")
+        self._warned = len(result.summary["warnings"])
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""
@@ -229,29 +243,33 @@ class Session:
 
 
 class ProgressBar:
-    """Progress on stderr, a bar if it is on, with a title before it; or else lines, if it speaks."""
+    """Progress on stderr: a bar at a terminal, elsewhere lines of a long computation; nothing where it is not wanted.
 
-    def __init__(self, title: str = "", on: bool = False, speaks: bool = True):
+    Args:
+        title: of the computation.
+        wanted: whether it is shown.
+    """
+
+    def __init__(self, title: str = "", wanted: bool = False):
+        self._title, self._wanted = title, wanted
         self._bar: Any = None
-        self._title = title
-        self._on, self._speaks = on, speaks
-        self._started = monotonic()
-        self._due, self._last = self._started + LONG, (0.0, -1.0)
+        self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
+        self._started, self._due = monotonic(), LONG
+        #: When (s after the start) the first share was done, and that share.
+        self._first: tuple[float, float] | None = None
 
     def start(self) -> None:
         """Draw the bar, which moves by itself until there is progress; it says so when equations are compiled."""
-        if not self._on:
+        if not (self._wanted and sys.stderr.isatty()):
             return
         from rich.console import Console
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
         columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20))
         percent = TextColumn("{task.fields[percent]}", markup=False)
-        console = Console(stderr=True)
-        self._bar = Progress(*columns, percent, TimeRemainingColumn(), console=console, transient=True)
+        self._bar = Progress(*columns, percent, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
         self._bar.add_task(self._title, total=None, percent="")
         self._bar.start()
-        self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
         self._log.addFilter(self._heard)
 
     def stop(self) -> None:
@@ -267,36 +285,35 @@ class ProgressBar:
             self.describe("compiling (first run only)")
         return record.levelno > logging.INFO
 
-    def describe(self, what: str = "") -> None:
+    def describe(self, what: str) -> None:
         """Say what is being done."""
         if self._bar is not None:
-            self._bar.update(0, description=": ".join(filter(None, (self._title, what))))
+            self._bar.update(0, description=f"{self._title}: {what}")
 
-    def says(self, line: str, always: bool = False) -> None:
-        """Print a line, above the bar if there is one; where lines are not wanted only what is always to be said."""
+    def print(self, line: str) -> None:
+        """Print a line, above the bar if there is one."""
         text = fitted(line, sys.__stderr__ or sys.stderr)  # the bar has another one in its place
         if self._bar is not None:
             self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
-        elif self._speaks or always:
+        else:
             print(text, file=sys.stderr, flush=True)
 
-    def __call__(self, share: float) -> None:
-        """Take note of the share of the work that is done."""
-        if self._bar is None:
-            if self._speaks:
-                self._tell(share)
-        elif share > 0.0:
-            self._bar.update(0, description=self._title, total=1.0, completed=share, percent=f"{100 * share:3.0f} %")
+    def says(self, line: str) -> None:
+        """Print a line that is a kind of progress."""
+        if self._wanted:
+            self.print(line)
 
-    def _tell(self, share: float) -> None:
-        """Print how far a long computation is and how long it will still take, by its pace since the last such line."""
-        now = monotonic()
-        since, before = self._last
-        if before < 0.0:  # compilation is over
-            self._due, self._last = max(self._due, now + LONG / 2), (now, share)
+    def __call__(self, share: float) -> None:
+        """Take note of the share of the work that is done: in the bar, or in lines at doubled times."""
+        if self._bar is not None and share > 0.0:
+            self._bar.update(0, description=self._title, total=1.0, completed=share, percent=f"{100 * share:3.0f} %")
+        if self._bar is not None or not self._wanted:
             return
-        if now < self._due or not before < share < 1.0:
-            return
-        left = (1.0 - share) * (now - since) / (share - before)
-        self._due, self._last = self._started + 2 * (now - self._started), (now, share)
-        self.says(f"{self._title}: {100 * share:.3g} % after {now - self._started:.0f} s, about {left:.3g} s to go")
+        now = monotonic() - self._started
+        if self._first is None:  # compilation is over
+            self._first, self._due = (now, share), max(self._due, now + LONG / 2)
+        since, before = self._first
+        if now >= self._due and before < share < 1.0:
+            self._due = 2 * now
+            left = (1.0 - share) * (now - since) / (share - before)
+            self.print(f"{self._title}: {100 * share:.3g} % after {now:.0f} s, about {left:.3g} s to go")

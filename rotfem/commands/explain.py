@@ -96,7 +96,6 @@ def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
         mode_count=scene.modes.count,
         about=scene.modes.about,
         newton=lambda: Newton.of(scene.solver),
-        past_limits=scene.solver.past_limits,
         unsteady=unsteady,
     )
 

@@ -12,7 +12,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from rotfem.results.files import whole_hdf5, write_whole
 from rotfem.results.modes import ModesResult
@@ -136,8 +135,10 @@ def central_properties(stiffness: Array, mass: Array) -> dict[str, Array]:
     }
 
 
-def axes_along(beam: Any, x: Array, root: Rotation) -> Array:
+def axes_along(beam: Any, x: Array, root: Any) -> Array:
     """Return the section axes of a beam's data as columns, (n, 3, 3), in the frame in which its root is turned so."""
+    from scipy.spatial.transform import Rotation  # slow to load, and only beams in space need it
+
     line = beam.reference_line
     chi, zeta = line.angles(x) if line is not None else np.zeros((2, len(x)))
     turned = Rotation.from_euler("ZYX", np.column_stack([chi, -zeta, evaluate(beam.pretwist, x)]))

@@ -81,7 +81,7 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> S
             return start
 
     def found(system: Any, notes: list[str]) -> Array:
-        return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=notes)
+        return steady_state(system, speed, Newton.of(solver), notes=notes)
 
     try:
         start.q = found(system, start.warnings)

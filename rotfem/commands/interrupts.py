@@ -1,10 +1,11 @@
-"""Ctrl-C and SIGTERM: in a march heard at once, obeyed between steps by all ranks; elsewhere held back."""
+"""Ctrl-C and SIGTERM: in a march obeyed between steps, by all ranks; elsewhere held back."""
 
 from __future__ import annotations
 
+import gc
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
@@ -39,29 +40,39 @@ def held_back() -> Iterator[None]:
             signal.raise_signal(first)
 
 
+@contextmanager
+def importing() -> Iterator[None]:
+    """Hold signals back as `held_back` does, and collect no garbage: what is imported stays, and is seen no more."""
+    gc.disable()
+    try:
+        with held_back():
+            yield
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:
     """Return whether all ranks have been interrupted at the same place; otherwise the others may be anywhere."""
     return comm.size == 1 or isinstance(stop, Stopped)
 
 
 class Interrupts:
-    """Context in which the signals that end a run wait for the end of a step. A second one does not wait.
-
-    Without it a rank would leave the others in the middle of what they do together.
+    """Context in which Ctrl-C and SIGTERM wait for the end of a step. A second one on one process does not wait.
 
     Args:
-        comm: communicator of the run.
-        at_once: called when a signal comes, whatever is being computed: mpirun gives a quarter of a second only.
-        wanted: whether signals are to wait; otherwise this is no context at all.
+        alone: whether there is one process; several must stop at the same step.
+
+    Attributes:
+        asked: whether a signal has come.
     """
 
-    def __init__(self, comm: MPI.Comm, at_once: Callable[[], None], wanted: bool):
-        self.comm, self.asked, self._at_once = comm, False, at_once
-        self.active = wanted and threading.current_thread() is threading.main_thread()
+    def __init__(self, alone: bool):
+        self.asked, self._alone = False, alone
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Self:
-        if self.active:
+        if threading.current_thread() is threading.main_thread():
             self._before = {number: signal.signal(number, self._hear) for number in SIGNALS}
         return self
 
@@ -70,7 +81,6 @@ class Interrupts:
             signal.signal(number, handler)
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
-        if self.asked and self.comm.size == 1:
+        if self.asked and self._alone:
             raise KeyboardInterrupt
         self.asked = True
-        self._at_once()

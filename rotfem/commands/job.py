@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.interrupts import held_back
+from rotfem.commands.interrupts import importing
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.units import seconds_of
 from rotfem.version import __version__
@@ -52,7 +52,7 @@ Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an e
 
 
 def folder_option(default: str) -> Any:
-    """Return the option -o of a result folder."""
+    """Return the option -o of a folder."""
     return typer.Option("-o", "--output", metavar="DIR", parser=as_path, help=f"result folder [{default}]")
 
 
@@ -70,7 +70,7 @@ def _root(
     if files:
         from rotfem.scene.extensions import load
 
-        with Session(False, False, False):
+        with Session():
             for path in files:
                 load(str(path), path, "command line", "--load")
 
@@ -92,6 +92,7 @@ class Job:
         plots: whether figures are wanted.
         report: whether report.html is.
         hint: receives advice; None where none is wanted.
+        shown: whether the result has been written and printed, all but its error.
     """
 
     scene: Scene
@@ -100,10 +101,16 @@ class Job:
     plots: bool
     report: bool
     hint: Callable[[str], None] | None
+    shown: bool = False
 
     def progress(self, share: float) -> None:
         """Show which share of the computation is done."""
         self.session.bar(share)
+
+    def show(self, result: Result) -> None:
+        """Write and print a result whose error is still to be estimated."""
+        self.session.finish(result, self.plots, last=False)
+        self.shown = True
 
     def finish(self, result: Result, further: Sequence[Writer] = ()) -> None:
         """Write a result, what else is wanted, and report.html if that is; print its report."""
@@ -117,14 +124,17 @@ class Job:
                 with suppress(InputError, ComputationError):
                     drawing = check(self.scene, comm=self.session.comm).plot()
             writers.append(partial(write_report, result, drawing))
-        self.session.finish(result, self.plots, writers)
+        if self.shown:
+            self.session.complete(result, writers)
+        else:
+            self.session.finish(result, self.plots, writers)
 
 
 @contextmanager
 def job(
     command: str,
     scene: SceneFile,
-    output: Annotated[Path | None, folder_option("results/<scene name>")] = None,
+    output: Annotated[Path | None, folder_option("results/<scene name>/<command>")] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
@@ -145,7 +155,7 @@ def job(
     debug: Debug = False,
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
-    with held_back():  # in the middle of an import what signals raise becomes any error
+    with importing():  # in the middle of an import what signals raise becomes any error
         from rotfem.scene import load_scene
 
     with Session(as_json, quiet, debug) as session:
@@ -157,12 +167,11 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         if lacking := missing():
             raise InputError("", None, lacking)
-        session.speed_unit = loaded.output.speed
-        session.start(f"{loaded.name}: {command}")
+        session.start(f"{loaded.name}: {command}", loaded.output.speed)
         if output is None and loaded.name in ("", ".", ".."):
             raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
-        folder = session.folder(output or Path("results") / loaded.name, command, loaded.inputs)
-        with held_back():
+        folder = session.folder(output or Path("results", loaded.name, command), command, loaded.inputs)
+        with importing():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         if report and find_spec("bokeh") is None:
             raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")

@@ -13,6 +13,7 @@ from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.results import ModesResult
 from rotfem.structures.mode_names import Wave, distinct, engineers_name
+from rotfem.units import speed_text
 
 Array = npt.NDArray[Any]
 
@@ -121,8 +122,8 @@ def critical(rows: list[dict[str, Any]], speed: float, fixed: bool) -> list[str]
         fixed: whether frequencies are those in the fixed frame.
     """
     return [
-        f"critical speed: {row['label']} has {omega:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an unbalance "
-        "meets no stiffness there"
+        f"critical speed: {row['label']} has {speed_text(omega, 3)} in the rotor at {speed_text(abs(speed))}; an "
+        "unbalance meets no stiffness there"
         for row in rows
         if row.get("whirl") == "forward" and (omega := abs(row["frequency"] - fixed * abs(speed))) < 1e-3 * abs(speed)
     ]

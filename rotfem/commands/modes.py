@@ -160,7 +160,7 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnal
     """
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
     analysis.everyone = comm
-    analysis.past_limits, analysis.estimates = scene.solver.past_limits, scene.output.error
+    analysis.estimates = scene.output.error
     if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis

@@ -1,8 +1,7 @@
 """`rotfem sweep`: a verb over a grid of scene keys, on one or several processes or ranks; a killed sweep goes on.
 
 Every point has a folder of its own, named after all that its result depends on, with the result as the verb writes it.
-A worker takes the next point whose folder no process has locked. A point is settled when its summary says done or
-failed.
+Each worker has points of its own. A point is settled when its summary says done or failed.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 import click
@@ -31,8 +29,8 @@ from rotfem.commands.cost.bench import fingerprint
 from rotfem.commands.job import app
 from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
-from rotfem.listeners import Progress
-from rotfem.results.result_set import ResultSet, holder, read_summary
+from rotfem.listeners import ONE_PROCESS, Progress
+from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
 from rotfem.scene import load_scene
 from rotfem.scene.extensions import load, loaded
@@ -98,22 +96,10 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
     return out
 
 
-def settle(point: Point, scene: Path, verb: Sequence[str]) -> bool:
-    """Compute a point unless that is done; return whether it is, and no other process is at it."""
-    if point.settled or holder(point.folder):
-        return point.settled
-    point.folder.mkdir(parents=True, exist_ok=True)
-    try:
-        _compute(point, scene, verb)
-    except OutputError:
-        if holder(point.folder):  # which was quicker
-            return False
-        raise
-    return True
-
-
-def _compute(point: Point, scene: Path, verb: Sequence[str]) -> None:
-    """Run the verb in this process, alone; a failure is reported in the point's summary."""
+def settle(point: Point, scene: Path, verb: Sequence[str]) -> None:
+    """Run the verb at a point in this process, alone, unless that is done; a failure is in the point's summary."""
+    if point.settled:
+        return
     import rotfem.commands.cli  # noqa: F401  the verbs
 
     changes = [part for change in point.changes for part in ("--set", change)]
@@ -123,25 +109,20 @@ def _compute(point: Point, scene: Path, verb: Sequence[str]) -> None:
         app(given, prog_name="rotfem", standalone_mode=False)
     except (ComputationError, InputError) as error:
         if not point.settled:
-            with ResultSet(point.folder, verb[0]) as results:
-                results.begin("writing")
+            with ResultFolder(ONE_PROCESS, point.folder, verb[0]) as results:
+                results.begin()
                 results.close(error)
     finally:
         ALONE.reset(token)
 
 
 def work(points: Sequence[Point], scene: Path, verb: Sequence[str], progress: Progress, parent: int = 0) -> None:
-    """Settle all points, together with whoever else does; stop if the process that started this one is gone."""
-    left = list(points)
-    while left:
-        for point in list(left):
-            if parent and os.getppid() != parent:
-                return
-            if settle(point, scene, verb):
-                left.remove(point)
-                progress(1.0 - len(left) / len(points))
-        if left:
-            sleep(0.2)  # others are computing these
+    """Settle points one after the other; stop if the process that started this one is gone."""
+    for number, point in enumerate(points, start=1):
+        if parent and os.getppid() != parent:
+            return
+        settle(point, scene, verb)
+        progress(number / len(points))
 
 
 def sweep(
@@ -181,7 +162,10 @@ def sweep(
         finally:
             comm.Barrier()
         with helpers(scene, keys, verb, folder, jobs - 1):
-            work(points, scene, verb, progress)
+            share = comm.rank if comm.size > 1 else 0
+            work(points[share :: max(jobs, comm.size)], scene, verb, progress)
+        if jobs > 1:
+            work(points, scene, verb, progress)  # what a helper has left
     except OutputError as error:
         problem = error
     raise_first(comm.allgather(problem))
@@ -230,28 +214,32 @@ def helpers(
 ) -> Iterator[None]:
     """Let further processes compute points meanwhile."""
     code = f"from {__name__} import help_out; help_out()"
-    given = [str(scene), dict(keys), list(verb), str(folder), os.getpid(), [*map(str, loaded())]]
     started = [subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE) for _ in range(number)]
-    for process in started:
+    for share, process in enumerate(started, start=1):
         assert process.stdin is not None
+        points = [share, number + 1]
+        given = [str(scene), dict(keys), list(verb), str(folder), points, os.getpid(), [*map(str, loaded())]]
         with suppress(BrokenPipeError), process.stdin as pipe:
             pipe.write(json.dumps(given).encode())
     try:
         yield
-    finally:
+    except BaseException:
         for process in started:
             process.terminate()
+        raise
+    finally:
         for process in started:
             process.wait()
 
 
 def help_out() -> None:
     """Compute points in a process that `helpers` has started. What it cannot write the other one says."""
-    scene, keys, verb, folder, parent, files = json.load(sys.stdin)
+    scene, keys, verb, folder, (share, jobs), parent, files = json.load(sys.stdin)
     with suppress(KeyboardInterrupt, OutputError):
         for file in files:
             load(file, Path(file), "sweep", "--load")
-        work(grid(Path(scene), keys, verb, Path(folder)), Path(scene), verb, lambda share: None, parent)
+        points = grid(Path(scene), keys, verb, Path(folder))[share::jobs]
+        work(points, Path(scene), verb, lambda share: None, parent)
 
 
 def row_of(point: Point, swept: Collection[str]) -> dict[str, Any]:

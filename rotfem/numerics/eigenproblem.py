@@ -25,8 +25,6 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.optimize import linear_sum_assignment
-from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
@@ -75,6 +73,8 @@ class RoundOff:
             ones.setValuesCSR(indptr, indices, np.ones(len(data)))
             ones.assemble()
             return ones
+        from scipy.sparse import csr_array  # slow to load, and most commands solve no eigenproblem
+
         block, (indptr, indices) = K.getBlockSize(), K.getRowIJ()
         lengths = np.diff(indptr)
         nodes = indices[np.repeat(np.arange(len(lengths)) % block == 0, lengths)] // block  # in the first row of each
@@ -152,6 +152,8 @@ def mirror_error(values: Array) -> float:
 
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
     """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
+    from scipy.optimize import linear_sum_assignment  # slow to load
+
     distance = np.abs(values[None, :] - wanted[:, None])
     index = np.argmin(distance, axis=1)
     rows, columns = linear_sum_assignment(distance)

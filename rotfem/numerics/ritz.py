@@ -21,7 +21,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg as sl
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -60,12 +59,14 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
     Raises:
         ComputationError: the stiffness, or with a target its sum with damping, is singular.
     """
+    from scipy.linalg import eig  # slow to load, and most commands solve no eigenproblem
+
     n = len(k)
     unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), TINY), TINY))
     shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
     try:
         right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
-        nu, left, right = sl.eig(np.vstack([-right_side, np.eye(n, 2 * n)]), left=True)
+        nu, left, right = eig(np.vstack([-right_side, np.eye(n, 2 * n)]), left=True)
         order = np.argsort(-np.abs(nu), kind="stable")
         order = order[np.abs(nu[order]) > 0.0]
         x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
@@ -184,13 +185,15 @@ def turn_equal(values: Array, vectors: tuple[Array, Array], matrices: tuple[Arra
         vectors: x and y, columns.
         matrices: M, C, K.
     """
+    from scipy.linalg import eig
+
     (x, y), (m, c, k) = vectors, matrices
     real = np.flatnonzero((np.abs(values.imag) <= EQUAL * np.abs(values)) & (values.real < 0.0))
     real = real[np.argsort(values.real[real])]
     groups = np.split(real, 1 + np.flatnonzero(np.diff(values.real[real]) > EQUAL * np.abs(values.real[real][1:])))
     for group in (g for g in groups if len(g) > 1):
         X, Y = (_real_span(v[:, group]) for v in (x, y))
-        _, turn = sl.eig(X.T @ k @ X, X.T @ m @ X)
+        _, turn = eig(X.T @ k @ X, X.T @ m @ X)
         if not np.all(np.isfinite(turn)) or np.max(np.abs(turn.imag)) > 0.0:
             continue
         lam = float(np.mean(values.real[group]))

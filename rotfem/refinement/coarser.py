@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse
 from dolfinx import geometry
 from mpi4py import MPI
 
@@ -115,6 +114,8 @@ def interpolation(V: Any, points: Array) -> Any:
 
     None where a point is not in the mesh, as at curved edges that another mesh has cut.
     """
+    import scipy.sparse  # slow to load
+
     mesh, element = V.mesh, V.element.basix_element
     padding = 1e-8 * float(np.ptp(mesh.geometry.x, axis=0).max())
     tree = geometry.bb_tree(mesh, mesh.topology.dim, padding=padding)

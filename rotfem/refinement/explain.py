@@ -71,7 +71,6 @@ class Case:
         mode_count: number of modes that are wanted.
         about: the state that modes are about: "steady" or "undeformed".
         newton: iteration control, of which everything takes its own.
-        past_limits: whether the path to an equilibrium is followed past maxima of the load.
         unsteady: why there is neither history nor steady state; "" if there is one.
     """
 
@@ -82,7 +81,6 @@ class Case:
     mode_count: int = 6
     about: str = "steady"
     newton: Callable[[], Newton] = Newton
-    past_limits: bool = False
     unsteady: str = ""
 
     def absent(self) -> dict[str, str]:
@@ -102,9 +100,7 @@ class Case:
         Raises:
             ComputationError: there is none.
         """
-        return with_plain_tangents(
-            system, lambda: steady_state(system, speed, self.newton(), past_limits=self.past_limits)
-        )
+        return with_plain_tangents(system, lambda: steady_state(system, speed, self.newton()))
 
     def start(self, system: Any) -> tuple[Array | None, Array | None]:
         """Return (q, q̇) of a system at t = 0, local dof arrays; None where it is undeformed, or at rest.
@@ -121,7 +117,6 @@ class Case:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
         """
         analysis = ModalAnalysis(system.model.problem, self.about, self.newton(), system.comm, system)
-        analysis.past_limits = self.past_limits
         spinning = with_plain_tangents(system, lambda: analysis.at(speed, self.mode_count))
         names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
         lasting = [not name.endswith(", fast") for name in names]  # overdamped ones have two eigenvalues

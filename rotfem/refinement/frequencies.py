@@ -117,7 +117,7 @@ class FrequencyErrors:
         # what its iterations show does not hold on another mesh
         newton = Newton(own.newton.tolerance, own.newton.max_iterations)
         there = ModalAnalysis(problem, own.about, newton, own.comm if system is None else system.comm, system)
-        there.past_limits, V = own.past_limits, own.system.V
+        V = own.system.V
         weights = interpolation(there.system.V, V.tabulate_dof_coordinates()[: V.dofmap.index_map.size_local])
         self._weights = weights if all(own.comm.allgather(weights is not None)) else None
         return there

@@ -1,62 +1,42 @@
-"""The file of a checkpoint: HDF5 with a head that says what it is and what its content must sum up to.
+"""The file of a checkpoint: arrays by name in an npz file, and all else as JSON. Nothing in it is executed.
 
-The head, the user block of the HDF5 file, is text: format, length and SHA-256 of what follows. A file with a right sum
-is trusted to be what this program wrote. The content is a tree of plain values as JSON, with arrays as datasets of
-their own. Nothing in it is code.
+A dataclass is stored by the names of its fields, with its own name.
 """
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from rotfem.errors import ComputationError, SceneError
-from rotfem.results.files import CHECKPOINT_MAGIC as MAGIC
 from rotfem.results.files import write_whole
 
 #: Number of the format; another one is refused.
-FORMAT = 2
-
-#: Length of the head of the file.
-HEAD = 512
-
-#: What a scheme may remember of the steps before.
-STORED = "a memory of the scheme that is of numbers, texts, arrays, tuples, lists, dicts and dataclasses"
+FORMAT = 3
 
 
 def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
-    """Write a tree, whole or not at all, and wait until it is on the disk.
-
-    It is of dicts, lists, tuples, dataclasses of the program, arrays, numbers and text.
+    """Write a tree of dicts, lists, tuples, dataclasses, arrays, numbers and texts, whole or not at all.
 
     Raises:
         OutputError: it cannot be written; the one before is still there.
-        ComputationError: something in it is of another type, and would be lost.
+        ComputationError: something in it is of another type.
     """
-    content = content_of(tree)
-    head = f"{MAGIC} {FORMAT}\n{len(content)}\n{hashlib.sha256(content).hexdigest()}\n".encode().ljust(HEAD, b"\0")
-    write_whole(path, head, content, durable=True)
-
-
-def content_of(tree: dict[str, Any]) -> bytes:
-    """Return the content of a checkpoint file."""
+    arrays: dict[str, Any] = {}
+    head = json.dumps({"format": FORMAT, "tree": _plain(tree, "", arrays)}).encode()
     image = io.BytesIO()
-    with h5py.File(image, "w", userblock_size=HEAD) as file:
-        arrays: list[np.ndarray[Any, Any]] = []
-        text = json.dumps(_plain(tree, arrays))
-        file.create_dataset("tree", data=np.frombuffer(text.encode(), dtype=np.uint8))
-        for i, array in enumerate(arrays):
-            file.create_dataset(f"arrays/{i}", data=array)
-    return image.getvalue()[HEAD:]
+    np.savez(image, head=np.frombuffer(head, dtype=np.uint8), **arrays)
+    with image.getbuffer() as content:
+        write_whole(path, content)
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
@@ -65,73 +45,76 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     Raises:
         SceneError: there is none, or it is damaged, of another format, or no checkpoint.
     """
-
-    def refused(why: str) -> SceneError:
-        return SceneError("command line", "--resume", path, why)
-
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise refused("there is no checkpoint; start the run with --checkpoint, and without --resume") from None
-    except OSError as error:
-        raise refused(f"cannot be read: {error.strerror or error}") from None
-    words = data[:HEAD].rstrip(b"\0").decode(errors="replace").split()
-    if len(words) != 4 or words[0] != MAGIC:
-        raise refused("is no checkpoint of rotfem, or its head is damaged; start the run anew, without --resume")
-    if words[1] != str(FORMAT):
-        raise refused(f"has format {words[1]}, this rotfem reads {FORMAT}; start the run anew, without --resume")
-    content = data[HEAD:]
-    if words[2:] != [str(len(content)), hashlib.sha256(content).hexdigest()]:
-        raise refused("is damaged: it does not sum up to what its head says; start the run anew, without --resume")
-    with h5py.File(io.BytesIO(data), "r") as file:
-        text = file["tree"][()].tobytes().decode()
-        arrays = [file[f"arrays/{i}"][()] for i in range(len(file.get("arrays", ())))]
-    tree: dict[str, Any] = _full(json.loads(text), arrays)
+    if not path.exists():
+        why = "there is no checkpoint; start the run with --checkpoint, and without --resume"
+        raise SceneError("command line", "--resume", path, why)
+    with checkpoint_of(path), np.load(path, allow_pickle=False) as file:
+        head = json.loads(file["head"].tobytes())
+        if (found := head["format"]) != FORMAT:
+            why = f"has format {found}, this rotfem reads {FORMAT}; start the run anew, without --resume"
+            raise SceneError("command line", "--resume", path, why)
+        tree: dict[str, Any] = _full(head["tree"], {name: file[name] for name in file.files})
     return tree
 
 
-def _plain(value: Any, arrays: list[Any]) -> Any:
-    """Return a tree that JSON knows; arrays are put into the list and referred to by their place in it.
+@contextmanager
+def checkpoint_of(path: Path) -> Iterator[None]:
+    """Say in one error that a file is not a checkpoint of this program.
 
     Raises:
-        ComputationError: something in it is of another type, and would be lost.
+        SceneError: in the place of what goes wrong with it.
     """
+    try:
+        yield
+    except SceneError:
+        raise
+    except Exception as error:  # of any kind, as anything may lie anywhere
+        why = f"is damaged, or no checkpoint of this rotfem ({type(error).__name__}); start the run without --resume"
+        raise SceneError("command line", "--resume", path, why) from None
+
+
+def _plain(value: Any, name: str, arrays: dict[str, Any]) -> Any:
+    """Return a tree that JSON knows; arrays are put into a dict by their path in the tree, and referred to by it.
+
+    Raises:
+        ComputationError: something in it is of another type.
+    """
+
+    def inner(entries: Any) -> dict[str, Any]:
+        return {str(key): _plain(entry, f"{name}.{key}".strip("."), arrays) for key, entry in entries}
+
     if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
-        arrays.append(value)
-        return {"array": len(arrays) - 1}
+        arrays[name] = value
+        return {"array": name}
     if isinstance(value, dict):
-        return {"dict": {key: _plain(entry, arrays) for key, entry in value.items()}}
-    if isinstance(value, tuple):
-        return {"tuple": [_plain(entry, arrays) for entry in value]}
-    if isinstance(value, list):
-        return [_plain(entry, arrays) for entry in value]
+        return {"dict": inner(value.items())}
+    if isinstance(value, list | tuple):
+        return {type(value).__name__: list(inner(enumerate(value)).values())}
+    if is_dataclass(value):
+        of_fields = inner((field.name, getattr(value, field.name)) for field in fields(value) if field.init)
+        return {f"{type(value).__module__}:{type(value).__qualname__}": of_fields}
     if isinstance(value, np.generic):
         return value.item()
-    if is_dataclass(value):
-        values = {field.name: _plain(getattr(value, field.name), arrays) for field in fields(value)}
-        return {f"{type(value).__module__}:{type(value).__qualname__}": values}
     if value is not None and not isinstance(value, bool | int | float | str):
-        raise ComputationError(f"a checkpoint cannot hold a {type(value).__qualname__}", advice=STORED)
+        raise ComputationError(f"a checkpoint cannot hold {name}, a {type(value).__qualname__}")
     return value
 
 
-def _full(value: Any, arrays: list[Any]) -> Any:
+def _full(value: Any, arrays: dict[str, Any]) -> Any:
     """Return the tree that `_plain` has made one of JSON."""
-    if isinstance(value, list):
-        return [_full(entry, arrays) for entry in value]
     if not isinstance(value, dict):
         return value
     ((kind, entry),) = value.items()
     if kind == "array":
         return arrays[entry]
-    if kind == "tuple":
-        return tuple(_full(part, arrays) for part in entry)
+    if kind in ("list", "tuple"):
+        return {"list": list, "tuple": tuple}[kind](_full(part, arrays) for part in entry)
     inner = {key: _full(part, arrays) for key, part in entry.items()}
-    return inner if kind == "dict" else _record(kind)(**inner)
+    return inner if kind == "dict" else _dataclass(kind)(**inner)
 
 
-def _record(name: str) -> Any:
-    """Return a dataclass of the program, or of what it has loaded, by "module:name"; nothing else is made of a file."""
+def _dataclass(name: str) -> Any:
+    """Return a dataclass of the program, or of a file that it has loaded, by "module:name"; nothing else is called."""
     module, _, attribute = name.partition(":")
     found = getattr(import_module(module) if module.startswith("rotfem.") else sys.modules.get(module), attribute, None)
     if not (isinstance(found, type) and is_dataclass(found)):

@@ -7,7 +7,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,6 @@ Array = npt.NDArray[np.float64]
 #: How the names of hidden files begin that are not whole yet; what a killed process leaves of them may be removed.
 PART = ".rotfem-"
 
-#: Name of the file with a checkpoint, and its first word.
-CHECKPOINT, CHECKPOINT_MAGIC = "checkpoint.h5", "rotfem-checkpoint"
-
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
@@ -38,25 +35,12 @@ def writing(path: Path) -> Iterator[None]:
         raise OutputError(path, error.strerror or str(error).partition("\n")[0]) from None
 
 
-def prepare_folder(folder: str | Path) -> Path:
-    """Make the result folder and see that it can be written, before anything is computed."""
-    path = Path(folder)
-    with writing(path):
-        path.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=path).close()
-    return path
-
-
 def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
     """Return why a file cannot be written there, or is one of the inputs; nothing where it can. Nothing is changed."""
     if os.path.realpath(path) in map(os.path.realpath, inputs):
         return "is what has been read; must be another file"
     if path.is_dir():
         return "is a folder; must be the path of a file"
-    if not path.parent.is_dir():
-        return f"there is no folder {path.parent}; must be in one that is there"
-    if path.exists() and not os.access(path, os.W_OK):
-        return "the file cannot be written; must be a writable one"
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             return ""
@@ -64,27 +48,19 @@ def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
         return f"nothing can be written in {path.parent}: {error.strerror or error}"
 
 
-def csv_text(columns: dict[str, Array]) -> str:
-    """Return columns as CSV with a header; numbers keep all their digits."""
+def csv_text(columns: Mapping[str, npt.ArrayLike | Sequence[Any]]) -> str:
+    """Return columns as CSV with a header; numbers keep all their digits, what is absent (None) stays empty."""
     buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(columns)
-    buffer.writelines(map(line, zip(*columns.values(), strict=True)))
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    plain = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    writer.writerows(zip(*plain, strict=True))
     return buffer.getvalue()
 
 
 def line(row: Iterable[float]) -> str:
     """Return numbers as a line of CSV, with all their digits."""
     return ",".join([repr(float(value)) for value in row]) + "\n"
-
-
-def rows_text(rows: list[dict[str, Any]]) -> str:
-    """Return rows of named values as CSV with a header; numbers keep all their digits, what is absent stays empty."""
-    buffer = io.StringIO()
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.DictWriter(buffer, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: repr(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows)
-    return buffer.getvalue()
 
 
 def read_csv(path: str | Path) -> dict[str, Array]:
@@ -106,13 +82,8 @@ def write_text(path: Path, text: str) -> Path:
     return write_whole(path, text.encode())
 
 
-def write_whole(path: Path, *content: bytes | memoryview, durable: bool = False) -> Path:
+def write_whole(path: Path, content: bytes | memoryview) -> Path:
     """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path.
-
-    Args:
-        path: the file.
-        content: of it, in parts.
-        durable: whether to wait until it is on the disk.
 
     Raises:
         OutputError: it cannot be written; the one before is still there.
@@ -121,20 +92,13 @@ def write_whole(path: Path, *content: bytes | memoryview, durable: bool = False)
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
             with os.fdopen(descriptor, "wb") as file:
-                for part in content:
-                    file.write(part)
-                if durable:
-                    file.flush()
-                    os.fsync(descriptor)
+                file.write(content)
             os.umask(mask := os.umask(0))
             os.chmod(name, 0o666 & ~mask)
             os.replace(name, path)
         except BaseException:
             os.unlink(name)
             raise
-        if durable:
-            with opened(path.parent, os.O_RDONLY) as folder:
-                os.fsync(folder)
     return path
 
 
@@ -154,27 +118,3 @@ def whole_hdf5(path: Path) -> Iterator[Any]:
         yield file
     with image.getbuffer() as content:
         write_whole(path, content)
-
-
-def overwrite(path: Path, text: str) -> None:
-    """Write a text into the room that a file has on the disk, the rest of it blank; nothing where it is too long.
-
-    Unlike `write_whole` this needs no room on the disk.
-
-    Raises:
-        OSError: it cannot be written.
-    """
-    with opened(path, os.O_WRONLY) as descriptor:
-        room, content = os.fstat(descriptor).st_size, text.encode()
-        if len(content) <= room:
-            os.pwrite(descriptor, content.ljust(room), 0)
-
-
-@contextmanager
-def opened(path: Path, flags: int) -> Iterator[int]:
-    """Open a file or folder that is no symbolic link; give its descriptor."""
-    descriptor = os.open(path, flags | os.O_NOFOLLOW, 0o666)
-    try:
-        yield descriptor
-    finally:
-        os.close(descriptor)

@@ -6,6 +6,7 @@ What is 0 everywhere (see `zeros`) has no panel; a line below the title names it
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rotfem.results.modes import ModesResult, ResponseResult
+    from rotfem.results.result import Result
     from rotfem.results.run import RunResult
 
 Array = npt.NDArray[np.float64]
@@ -30,6 +32,9 @@ VISIBLE = 1e-3
 
 
 # --- panels -----------------------------------------------------------------------------------------------------------
+
+#: Inches around panels: left of one, right of one, below the lowest, from the top of one to that of the next.
+LEFT, RIGHT, BELOW, ROW = 0.85, 0.2, 0.5, 1.75
 
 
 def dress(panel: Axes, x: str = "", y: str = "", size: float | None = 8) -> None:
@@ -41,20 +46,53 @@ def dress(panel: Axes, x: str = "", y: str = "", size: float | None = 8) -> None
         panel.tick_params(which="both", labelsize=size)
 
 
-def panels_over(x: str, number: int, title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels over the column x in one to three columns, the first of them filled first."""
+def heading(result: Result) -> str:
+    """Return the title of a figure of components: what was computed, and the frame whose axes they are along."""
+    return f"{result.title}, {result.summary.get('frame', 'rotating')} frame"
+
+
+def titled(width: float, height: float, title: str) -> tuple[Figure, float]:
+    """Return a figure of a width and, below its title, a height; and the part of the latter (inch)."""
+    lines = [part for line in title.split("\n") for part in wrap(line, int(12 * width))]
+    above = 0.05 + 0.18 * len(lines)
+    figure = Figure(figsize=(width, height + above))
+    figure.suptitle("\n".join(lines), fontsize=10, y=1.0 - 0.06 / (height + above), va="top")
+    return figure, height / (height + above)
+
+
+def panels_over(x: str, number: int, title: str, below: float = 0.0) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels over the column x in one to three columns, the first of them filled first.
+
+    Places are fixed, as what Matplotlib finds by itself takes it longer than all the rest. Inches are left free below.
+    """
     columns = 1 if number <= 3 else 2 if number <= 12 else 3
     rows = -(-max(number, 1) // columns)
-    figure = Figure(figsize=(max(5.0 * columns, 7.0), 1.75 * rows + 1.0), layout="constrained")
-    figure.suptitle(title, fontsize=10, wrap=True)
-    panels = [figure.add_subplot(rows, columns, (i % rows) * columns + i // rows + 1) for i in range(number)]
-    for i, panel in enumerate(panels):
+    width, height = max(5.0 * columns, 7.0), ROW * rows + BELOW + below
+    figure, part = titled(width, height, title)
+    across, panels = width / columns - LEFT - RIGHT, []
+    for i in range(number):
+        left, bottom = width / columns * (i // rows) + LEFT, height - ROW * (i % rows + 1)
+        box = left / width, bottom / height * part, across / width, (ROW - 0.3) / height * part
+        panels.append(panel := figure.add_axes(box))
         lowest = i % rows == rows - 1 or i == number - 1
         dress(panel, label(x) if lowest else "")
         panel.tick_params(labelbottom=lowest)
-        panel.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+        panel.ticklabel_format(axis="y", scilimits=(-3, 4))
+        panel.yaxis.set_offset_position("right")
         panel.yaxis.get_offset_text().set_fontsize(7)
+        panel.xaxis.set_label_coords(0.5, -0.3 / (ROW - 0.3))
+        panel.yaxis.set_label_coords(-0.65 / across, 0.5)
     return figure, panels
+
+
+def power_of_ten(value: float, place: int | None = None) -> str:
+    """Return a tick of a logarithmic axis; Matplotlib's own takes a grammar of formulas."""
+    return "10" + str(round(np.log10(value))).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def caption(panel: Axes, text: str) -> None:
+    """Write what a panel shows above its left end."""
+    panel.set_title(text, fontsize=8, loc="left", pad=3, y=1.0)
 
 
 def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
@@ -82,33 +120,37 @@ def stacked(
     shown, title = not_zero({**columns, **ranges}, title)
     figure, panels = panels_over(x, len(shown), title)
     for panel, name in zip(panels, shown, strict=True):
-        caption = described(name)[0]
+        said = described(name)[0]
         if x == "t":
-            caption += history_line(panel, at, columns[name])
+            said += history_line(panel, at, columns[name])
         else:
             panel.plot(at, columns[name], lw=1.2, marker=".", ms=4)
         if name in ranges:
             panel.fill_between(at, *ranges[name], alpha=0.2, lw=0.0)
-        panel.set_title(caption, fontsize=8, loc="left", pad=3)
+        caption(panel, said)
         panel.set_ylabel(shown_unit(name, units.get(name, "")))
         panel.set_xlim(at[0], at[-1])
-    figure.align_ylabels()
     return figure
+
+
+def periods(y: Array) -> int:
+    """Return how often a history is largest between smaller values, by more than 1 % of its range."""
+    levels = np.rint(100.0 * (y - np.min(y)) / (np.ptp(y) or 1.0))
+    moves = np.diff(levels)
+    ups = moves[moves != 0.0] > 0.0
+    return int(np.count_nonzero(ups[:-1] & ~ups[1:]))
 
 
 def history_line(axis: Axes, t: Array, y: Array) -> str:
     """Draw a history, one of more than 500 periods as range and mean of 250 stretches; return what to say of it."""
-    from scipy.signal import find_peaks  # half of what `import` of this file would take
-
-    periods = len(find_peaks(y, prominence=0.01 * float(np.ptp(y)))[0]) if np.ptp(y) > 0.0 else 0
-    if periods <= 500:
+    if (count := periods(y)) <= 500:
         axis.plot(t, y, lw=1.0)
         return ""
     times, parts = np.array_split(t, 250), np.array_split(y, 250)
     middle, mean = np.array([part.mean() for part in times]), np.array([part.mean() for part in parts])
     axis.fill_between(middle, [part.min() for part in parts], [part.max() for part in parts], alpha=0.35, lw=0.0)
     axis.plot(middle, mean, lw=1.2)
-    return f", range and mean of {periods} periods"
+    return f", range and mean of {count} periods"
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -120,7 +162,7 @@ def history_figure(result: RunResult) -> Figure:
     tip = [name for name in history if name.startswith("tip_")]
     hub = [name for name in ("psi_dot", "psi", "pitch", "torque") if name in history]
     speed = history["psi_dot"]
-    title = result.title
+    title = heading(result)
     if np.ptp(speed) <= ZERO * np.max(np.abs(speed)):
         hub = [name for name in hub if not name.startswith("psi")]
         title += f", {units.speeds(speed[0]):.6g} {units.speed}"
@@ -131,18 +173,18 @@ def history_figure(result: RunResult) -> Figure:
 def loads_figure(result: RunResult) -> Figure:
     """Return forces and moments of the hub on the root over time."""
     loads = {name: values for name, values in result.history.items() if name.startswith("root_")}
-    return stacked("t", result.history["t"], loads, f"{result.title}, loads of the hub on the root")
+    return stacked("t", result.history["t"], loads, f"{heading(result)}, loads of the hub on the root")
 
 
 def shape_figure(result: RunResult) -> Figure:
     """Return the components of a steady state along the structure."""
     components = {name: values for name, values in result.shape.items() if name != "x"}
-    return stacked("x", result.shape["x"], components, result.title + ", steady state")
+    return stacked("x", result.shape["x"], components, heading(result) + ", steady state")
 
 
 def stations_figure(result: RunResult) -> Figure:
     """Return every quantity along a beam at the last time, and of a motion the range it has had."""
-    stations, title = result.stations, result.title
+    stations, title = result.stations, heading(result)
     assert stations is not None
     last = {name: values[-1] for name, values in stations.values.items()}
     if len(stations.t) < 2:
@@ -162,8 +204,8 @@ def shapes_figure(result: ModesResult) -> Figure:
     """
     first = next(iter(result.shapes.values()))
     names = [n for n in first if (n.startswith("u") or n == "theta1") and not n.endswith("_imag")]
-    title = f"{result.title}, largest displacement 1, imaginary parts dashed"
-    figure, panels = panels_over("x", len(result.shapes), title)
+    title = f"{heading(result)}, largest displacement 1, imaginary parts dashed"
+    figure, panels = panels_over("x", len(result.shapes), title, below=0.3)
     drawn = {}
     for panel, (row, columns, frequency) in zip(panels, result.with_shapes(), strict=True):
         x = columns["x"]
@@ -174,22 +216,22 @@ def shapes_figure(result: ModesResult) -> Figure:
                 drawn[name] = panel.plot(x, real, lw=1.4, color=f"C{c}", label=what)[0]
             if np.max(np.abs(imaginary)) > VISIBLE:
                 panel.plot(x, imaginary, lw=1.0, ls="--", color=f"C{c}")
-        panel.set_title(f"{row['mode']}  {row['name']}, {frequency}", fontsize=8, loc="left", pad=3)
+        caption(panel, f"{row['mode']}  {row['name']}, {frequency}")
         panel.set_xlim(x[0], x[-1])
         panel.set_ylabel("shape (–)")
     handles = [drawn[name] for name in names if name in drawn]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(names), fontsize=8, frameon=False)
+    figure.legend(handles=handles, loc="lower center", ncols=len(names), fontsize=8, frameon=False)
     return figure
 
 
 def response_figure(result: ResponseResult) -> Figure:
-    """Return amplitudes, direct and by modes (dashed), and phases over frequency, of tip, root and hub.
+    """Return amplitudes and phases over frequency, of tip, root and hub.
 
     A row has what is of one kind. Deep antiresonances, at most 5 % of the frequencies, are cut off.
     """
     units = ShownUnits.of(result.summary)
     own = {name: i for i, name in enumerate(result.outputs) if "@" not in name}  # no stations
-    title = f"{result.title}, at {units.speeds(result.summary['speed']):.6g} {units.speed}\namplitudes by modes dashed"
+    title = f"{heading(result)}, at {units.speeds(result.summary['speed']):.6g} {units.speed}"
     shown, title = not_zero({name: np.abs(result.direct[:, i]) for name, i in own.items()}, title)
     rows: dict[tuple[str, str], list[str]] = {}
     for name in shown:
@@ -205,9 +247,8 @@ def response_figure(result: ResponseResult) -> Figure:
         dress(left, y=f"amplitude {shown_unit(names[0])}")
         dress(right, y="phase (°)")
         for c, name in enumerate(names):
-            direct, modal = result.direct[:, own[name]], np.abs(result.modal[:, own[name]])
+            direct = result.direct[:, own[name]]
             left.semilogy(x, np.abs(direct), marker=mark, lw=1.3, color=f"C{c}")
-            left.semilogy(x, modal, lw=0.9, ls="--", color="0.3")
             phase = np.degrees(np.angle(direct))
             jumps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
             broken = np.insert(x, jumps, np.nan), np.insert(phase, jumps, np.nan)
@@ -217,6 +258,7 @@ def response_figure(result: ResponseResult) -> Figure:
         sizes = np.abs(result.direct[:, [own[name] for name in names]])
         seen = max(0.3 * float(np.min(np.quantile(sizes, 0.05, axis=0))), ZERO * float(np.max(sizes)))
         left.set_ylim(seen, 3.0 * float(np.max(sizes)))
+        left.yaxis.set_major_formatter(power_of_ten)
         right.set(ylim=(-190, 190), yticks=np.arange(-180, 181, 90))
         right.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
     panels[0, 0].set_xlim(*(x[[0, -1]] if len(x) > 1 else 0.5 * x[0] * np.array([1, 3])))
@@ -268,7 +310,7 @@ def draw(axis: Axes, mesh: Triangulation, values: Array, still: Array | None = N
 
 def add_bar(figure: Figure, drawn: Any, axes: Any, caption: str) -> None:
     """Add a colour bar to the right of one axis or of several."""
-    powers = ScalarFormatter(useMathText=True)
+    powers = ScalarFormatter()
     powers.set_powerlimits((-3, 4))
     aspect = 40 if isinstance(axes, list) else 20
     bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=aspect, fraction=0.05, format=powers)
@@ -290,13 +332,13 @@ def fields_figure(columns: Mapping[str, Array], triangles: Array, names: list[st
 
 def plate_figure(result: RunResult) -> Figure:
     """Return maps of the displacements of the final shape."""
-    return fields_figure(result.shape, result.triangles, ["u1", "u2", "u3"], result.title + ", final shape")
+    return fields_figure(result.shape, result.triangles, ["u1", "u2", "u3"], heading(result) + ", final shape")
 
 
 def resultants_figure(result: RunResult) -> Figure:
     """Return maps of the stress resultants at the end."""
     names = [name for name in result.resultants if name not in ("x", "y")]
-    return fields_figure(result.resultants, result.triangles, names, result.title + ", final stress resultants")
+    return fields_figure(result.resultants, result.triangles, names, heading(result) + ", final stress resultants")
 
 
 def plate_modes_figure(result: ModesResult) -> Figure:
@@ -304,7 +346,7 @@ def plate_modes_figure(result: ModesResult) -> Figure:
     shapes = result.shapes
     first = next(iter(shapes.values()))
     mesh = Triangulation(first["x"], first["y"], result.triangles)
-    figure, axes = maps(len(shapes), mesh, f"{result.title}, largest displacement 1")
+    figure, axes = maps(len(shapes), mesh, f"{heading(result)}, largest displacement 1")
     sizes = np.array([[np.hypot(c[n], c.get(f"{n}_imag", 0.0)) for n in ("u1", "u2", "u3")] for c in shapes.values()])
     clamped = np.all(sizes == 0.0, axis=(0, 1))
     for axis, (row, columns, frequency), size in zip(axes, result.with_shapes(), sizes, strict=True):

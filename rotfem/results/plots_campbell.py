@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, ShownUnits, label
-from rotfem.results.plots import dress
+from rotfem.results.plots import LEFT, dress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,9 +69,12 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
-    heights = [max(4.8, (len(shown) + len(orders) + 1) * NAME_HEIGHT), 1.6][: 1 + damped]
-    figure = Figure(figsize=(WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(w_pad=0.1))
-    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    heights: list[float] = [max(4.8, (len(shown) + len(orders) + 1) * NAME_HEIGHT), 1.6][: 1 + damped]
+    above = [b for b in branches if b not in shown]
+    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
+    names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
+    figure = Figure(figsize=(WIDTH, sum(heights)))
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False)[:, 0]
     axis = panels[0]
     seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
     captions = [label(seen, units.frequency), "damping ratio (%)"]
@@ -96,19 +98,22 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
     name_lines(axis, shown, rays, heights[0])
-    above = [b for b in branches if b not in shown]
-    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
-    names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": "0.4", "va": "bottom"}
     axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
-    figure.suptitle(result.title, fontsize=11)
     entries += line_entries(shown)
-    around = 1.1 + 0.2 * -(-len(entries) // 3) + 0.12 * len(names) + 0.2 * damped
-    figure.set_figheight(sum(heights) + around)
+    letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
+    right = 0.35 + max(0.068 * letters[0], 0.06 * letters[1])
+    over = 0.4 + max(0.12 * len(names), 0.2 * any(slope * last > top for _, slope in rays))
+    below = 0.65 + 0.2 * -(-len(entries) // 3)
+    height = over + sum(heights) + 0.2 * damped + below
+    figure.set_figheight(height)
+    for panel, own, under in zip(panels, heights, [below + sum(heights[1:]) + 0.2 * damped, below], strict=False):
+        panel.set_position((LEFT / WIDTH, under / height, 1.0 - (LEFT + right) / WIDTH, own / height))
+    figure.suptitle(result.title, fontsize=11, y=1.0 - 0.08 / height, va="top")
     if entries:
-        figure.legend(handles=entries, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+        figure.legend(handles=entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
@@ -129,7 +134,7 @@ def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
         further = [
             (c.speed, seen_fixed(c) if fixed else c.frequency)
             for c in result.critical_speeds
-            if c.branch == number and c.kind != "per_rev" and c.speed not in speed
+            if c.branch == number and not (fixed and c.kind == "per_rev") and c.speed not in speed
         ]
         at = np.searchsorted(speed, [s for s, _ in further])
         out.append(

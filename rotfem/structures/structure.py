@@ -327,8 +327,7 @@ class Structure:
         return self.problem.loads.at
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction in the frame.
-        """
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction."""
         given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
         return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
 

@@ -67,8 +67,7 @@ def _bends_only(problem: Problem) -> bool:
 
 
 def directions(problem: Problem) -> tuple[Array, Array]:
-    """Return in which directions of the frame anything drives a problem at any time, True also where that is unknown.
-    """
+    """Return in which directions (3,) polar and axial vectors may drive a problem at any time, frame components."""
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
     polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)

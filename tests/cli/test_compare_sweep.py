@@ -45,7 +45,7 @@ def test_compare_refuses(folder: Path, rotfem: Rotfem) -> None:
     for arguments, said in (
         (("a",), "two results at least"),
         (("a", "empty"), "no result"),
-        (("a", "a", "-o", "a"), "the scene reads it"),
+        (("a", "a", "-o", "a"), "which is read"),
     ):
         done = rotfem("compare", *arguments)
         assert done.status == 2, arguments

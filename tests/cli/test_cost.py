@@ -46,7 +46,7 @@ def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) 
     assert all(line.startswith("beam: cost: ") for line in done.err.splitlines())  # progress, where it takes long
     assert "tuned scene in tuned.toml" in done.out
     assert "for a relative accuracy of 0.02: reissner, " in done.out
-    results = folder / "results" / "beam"
+    results = folder / "results" / "beam" / "cost"
     assert {"cost.csv", "cost.json", "cost.jsonl", "cost.png", "summary.json"} <= set(os.listdir(results))
     summary = json.loads((results / "summary.json").read_text())
     row = summary["recommended"]
@@ -65,7 +65,7 @@ def test_what_the_budget_leaves_out_is_said(rotfem: Rotfem, folder: Path) -> Non
     """Errors of 1e-9 take more steps than five seconds allow; what was reached is written."""
     done = rotfem("cost", "beam.toml", "--quick", "--budget", "5s", "--accuracy", "1e-9", "--no-plots")
     assert done.status == 3
-    summary = json.loads((folder / "results" / "beam" / "summary.json").read_text())
+    summary = json.loads((folder / "results" / "beam" / "cost" / "summary.json").read_text())
     assert summary["budget"]["seconds"] == 5.0
     assert summary["budget"]["used"] < 7.0
     assert summary["budget"]["refused"]
@@ -82,7 +82,7 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
     assert done.status == 3
     assert "no setting tried is within 0.0001" in done.err
     assert "no setting is known to be within 0.0001 (relative): the best error is" in done.out
-    assert (folder / "results" / "beam" / "cost.csv").exists()
+    assert (folder / "results" / "beam" / "cost" / "cost.csv").exists()
     assert not (folder / "tuned.toml").exists()
 
 
@@ -111,7 +111,7 @@ def test_bad_options(rotfem: Rotfem, folder: Path, arguments: tuple[str, ...], s
     assert done.status == 2
     assert says in done.err
     assert "Traceback" not in done.err
-    assert not (folder / "results" / "beam" / "cost.jsonl").exists()  # nothing was computed
+    assert not (folder / "results" / "beam" / "cost" / "cost.jsonl").exists()  # nothing was computed
 
 
 def test_degrees_that_lock_on_a_mesh_file_are_refused(rotfem: Rotfem, folder: Path) -> None:
@@ -147,14 +147,14 @@ def test_interrupt_keeps_what_is_finished(folder: Path) -> None:
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
-    record = folder / "results" / "beam" / "cost.jsonl"
+    record = folder / "results" / "beam" / "cost" / "cost.jsonl"
     limit = time.monotonic() + 60
     while time.monotonic() < limit and not (record.exists() and record.stat().st_size > 0):
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    said = "what was measured is in results/beam, and the same command goes on from there"
+    said = "what was measured is in results/beam/cost, and the same command goes on from there"
     assert err == f"rotfem: interrupted; {said}\n"
     assert all(json.loads(line)["measurement"]["status"] for line in record.read_text().splitlines())
 
@@ -167,7 +167,7 @@ def test_hint_at_the_start_of_a_run(rotfem: Rotfem, folder: Path) -> None:
     assert done.status == 0
     (hint,) = done.err.splitlines()
     assert hint.startswith("hint: speed and loads are constant")
-    summary = folder / "results" / "beam" / "summary.json"
+    summary = folder / "results" / "beam" / "cost" / "summary.json"
     assert json.loads(summary.read_text())["advice"] == [hint.removeprefix("hint: ")]
     assert "hint" not in rotfem(*still, "-q").err
     assert "hint" not in rotfem(*still, "--no-advice").err

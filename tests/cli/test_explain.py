@@ -42,7 +42,11 @@ def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Rotfem) -> N
         assert name in done.out
     assert "gravity (no gravity)" in done.out
     assert "by the full models" not in done.out
-    assert {f.name for f in (folder / "results" / "beam").iterdir()} == {"explain.json", "explain.png", "summary.json"}
+    assert {f.name for f in (folder / "results" / "beam" / "explain").iterdir()} == {
+        "explain.json",
+        "explain.png",
+        "summary.json",
+    }
 
 
 def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem) -> None:

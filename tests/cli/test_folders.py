@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +11,6 @@ from typing import Any
 import pytest
 
 from rotfem.commands.recorder import Monitor
-from rotfem.results.files import read_csv
 from tests.beams import BEAM_TABLE
 from tests.cli.conftest import Done
 from tests.launch import environment
@@ -44,17 +41,11 @@ def status(folder: str) -> str:
     return found
 
 
-def test_a_table_is_not_written_over(rotfem: Any) -> None:
-    for command in (["run"], ["modes"], ["check"]):
-        done: Done = rotfem(*command, "beam.toml", "-o", ".", "--no-plots")
-        assert done.status == 2
-        assert "output history.csv: cannot be written: the scene reads it" in done.err
-        assert done.err.count("\n") == 1
-    assert sorted(path.name for path in Path().iterdir()) == ["beam.toml", "history.csv"]
-    assert Path("history.csv").read_text() == TABLE
-    done = rotfem("cost", "beam.toml", "--write", "./history.csv")
+def test_an_input_is_not_written_over(rotfem: Any) -> None:
+    done: Done = rotfem("cost", "beam.toml", "--write", "./history.csv")
     assert (done.status, done.err.count("\n")) == (2, 1)
     assert "is what has been read" in done.err
+    assert Path("history.csv").read_text() == TABLE
 
 
 def test_a_blade_file_is_not_written_over(rotfem: Any) -> None:
@@ -86,57 +77,6 @@ def test_an_error_nobody_foresaw_leaves_the_status_failed(rotfem: Any, monkeypat
     assert done.status == 0
     assert "out: run failed: ZeroDivisionError: nobody foresaw it" in done.out
     assert json.loads(rotfem("check", "out", "--json").out)["status"] == "failed"
-
-
-def test_a_kill_is_said_by_the_next_command_and_by_check(rotfem: Any) -> None:
-    program = f"""
-import os
-from rotfem.commands.cli import main
-from rotfem.commands.run_store import RunStore
-saved = RunStore._save
-def killed(*given):
-    saved(*given)
-    os.kill(os.getpid(), {int(signal.SIGKILL)})
-RunStore._save = killed
-main()
-"""
-    command = [sys.executable, "-c", program, "run", "beam.toml", "-o", "out", "--checkpoint", "50"]
-    killed = subprocess.run(command, env=environment(), capture_output=True, check=False, timeout=300)
-    assert killed.returncode == -signal.SIGKILL
-    assert status("out") == "running"
-    done: Done = rotfem("check", "out")
-    assert done.status == 0
-    assert "out: run failed: process" in done.out
-    assert "has ended without a word" in done.out
-    assert "--resume goes on from its checkpoint" in done.out
-    done = rotfem("run", "beam.toml", "-o", "out", "--resume", "--no-plots", "--set", "time.end=0.7")
-    assert done.status == 0
-    assert "warning: out: run failed: process" in done.err
-    assert rotfem("check", "out").out == "out: run done; history.csv has 71 rows, up to t = 0.7 s\n"
-    assert rotfem("check", ".").status == 2
-
-
-def test_on_a_full_disk_rows_that_fit_and_the_checkpoint_are_usable(rotfem: Any) -> None:
-    """The system refuses files beyond a size, as it does where there is no room: some 500 rows of 800."""
-    assert rotfem("run", "beam.toml", "-o", "whole", "--no-plots").status == 0
-    whole = Path("whole/history.csv").read_bytes()
-    most = len(whole) * 5 // 8
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
-    try:
-        done: Done = rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--checkpoint", "100")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert done.status == 2
-    assert "history.csv: cannot be written: File too large" in done.err
-    assert status("out") == "failed"
-    there = Path("out/history.csv").read_bytes()
-    assert most - 300 < len(there) <= most, "all rows that fit"
-    assert whole.startswith(there)
-    assert there.endswith(b"\n")
-    assert read_csv("out/history.csv")["t"][-1] > 4.0
-    assert rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--resume").status == 0
-    assert Path("out/history.csv").read_bytes() == whole
 
 
 #: Runs one command line after another, given as JSON, and writes what comes of each.

@@ -52,7 +52,7 @@ def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Rotfem) -> 
     assert "1st edgewise" in done.out
     assert "rad/s" in done.out
     assert "damping" in done.out
-    out = folder / "results" / "beam"
+    out = folder / "results" / "beam" / "modes"
     assert written(out) == {"modes.csv", "modes.json", "mode_shapes.csv", "modes.png", "summary.json", *FIELDS}
     assert len(json.loads((out / "modes.json").read_text())["modes"]) == 3
 
@@ -87,7 +87,7 @@ def test_campbell_prints_branches_and_writes_files(folder: Path, rotfem: Rotfem)
     assert "critical speed" in done.out
     assert "meets 2Ω" in done.out
     assert "MAC" in done.out
-    out = folder / "results" / "beam"
+    out = folder / "results" / "beam" / "campbell"
     assert written(out) == {"campbell.csv", "campbell.json", "campbell.png", "summary.json"}
     rows = json.loads((out / "campbell.json").read_text())["rows"]
     assert {row["speed"] for row in rows if not row["refined"]} == {0.0, 2.0, 4.0, 6.0}

@@ -22,7 +22,6 @@ from tests.fuzz.trying import COMPUTATION, sized, within
 SPEEDS = [
     "0:6:3",
     "0:1e300:3",
-    "0:6:1000000000",
     "6:0:3",
     "0:6",
     "0:6:3:4",
@@ -41,7 +40,6 @@ SETTINGS += [
     "nothing",
     "=",
     "a=",
-    "limits.steps=1",
 ]
 
 setting = st.one_of(st.sampled_from(SETTINGS), st.builds("{}={}".format, texts, st.one_of(values, texts)), texts)

@@ -8,11 +8,9 @@ from typing import Any
 
 import hypothesis.strategies as st
 import tomli_w
-from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
-from rotfem.scene.files import read_rows
 from tests.fuzz.mutants import mutants, numbers, texts, values
 from tests.fuzz.seeds import COMPUTED, SCENES, SEEDS
 from tests.fuzz.trying import VALIDATION, check_message, sized, within
@@ -84,7 +82,7 @@ KEYS = [
     "time",
     "structure.section.EA",
     "motion.speed",
-    "limits.steps",
+    "structure.supports.0.x",
     "mesh",
     "a.b.c",
     "",
@@ -123,19 +121,8 @@ cells = st.one_of(st.sampled_from(CELLS), st.floats().map(repr), st.text(max_siz
 lines = st.lists(cells, min_size=1, max_size=4).map(",".join)
 
 
-def rows_or_why(text: str) -> dict[int, tuple[float, ...]] | str:
-    """Return the rows of a table, or why it is none."""
-    try:
-        return read_rows(text, Path("speed.csv"))
-    except PydanticCustomError as error:
-        return error.message()
-
-
 @sized(st.lists(lines, max_size=6).map("\n".join), core=150, nightly=2500)
 def test_tables_in_files_of_any_kind(text: str) -> None:
-    """Also: what is read line by line is what is read cell by cell, as where one letter is none of ASCII."""
-    text = text.replace("\r", "\n")
-    assert rows_or_why(text) == rows_or_why(f"{text}\n# é")
     beam = COMPUTED["adaptive"] | {"motion": {"type": "table", "table": "speed.csv"}}
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "speed.csv").write_bytes(text.encode("utf-8", "surrogatepass"))

@@ -11,6 +11,7 @@ import pytest
 
 from rotfem.results.files import read_csv
 from tests.beams import PLATE_TABLES, SECTION
+from tests.histories import difference
 from tests.launch import MPIRUN, rotfem
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
@@ -54,20 +55,19 @@ def summaries(folder: Path, text: str, *arguments: str) -> list[dict[str, Any]]:
     return out
 
 
-def test_a_history_is_that_of_one_process_to_the_last_bit(tmp_path: Path) -> None:
-    """Also of a run of two processes that goes on from its checkpoint."""
+def test_a_history_is_that_of_one_process(tmp_path: Path) -> None:
+    """To the last bit; and to 1e-9 that of two processes that go on from a checkpoint, or of one that goes on."""
     (tmp_path / "scene.toml").write_text(BEAM + TIME)
     base = ("run", "scene.toml", "--no-plots")
-    whole = rotfem(tmp_path, 1, *base, "-o", "r1")
-    first = rotfem(tmp_path, 2, *base, "-o", "r2", "--checkpoint", "7", "--set", "time.end=0.1")
-    rest = rotfem(tmp_path, 2, *base, "-o", "r2", "--resume")
-    assert [whole.returncode, first.returncode, rest.returncode] == [0, 0, 0], first.stderr + rest.stderr
-    assert "2 processes each computed all of it" in rest.stdout
-    one, two = (json.loads((tmp_path / f"r{ranks}" / "summary.json").read_text()) for ranks in (1, 2))
-    assert two["shared"] == "nothing"
-    assert two["error"] == one["error"]
+    starts = [(1, "whole", ()), (2, "two", ()), (2, "cut", ("--checkpoint", "7", "--set", "time.end=0.1"))]
+    for ranks, folder, options in [*starts, (2, "cut", ("--resume",))]:
+        done = rotfem(tmp_path, ranks, *base, "-o", folder, *options)
+        assert done.returncode == 0, done.stderr
+    assert "2 processes each computed all of it" in done.stdout
+    assert json.loads((tmp_path / "two" / "summary.json").read_text())["shared"] == "nothing"
     for name in ("history.csv", "shape.csv"):
-        assert (tmp_path / "r1" / name).read_bytes() == (tmp_path / "r2" / name).read_bytes()
+        assert (tmp_path / "two" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+        assert difference(*(read_csv(tmp_path / folder / name) for folder in ("cut", "whole"))) < 1e-9
 
 
 def test_files_of_a_plate_are_written_once(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from rotfem.analysis.dense_output import RowTimes, between
+from rotfem.analysis.dense_output import RowTimes, between, multiples
 from rotfem.analysis.schemes import State
 from rotfem.analysis.time_grid import Leg
 
@@ -47,7 +47,7 @@ def test_what_holds_linearly_at_the_ends_holds_between() -> None:
 def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
     """Whether steps are longer or shorter; a row at the end of a step is the state itself."""
     p = np.polynomial.Polynomial([0.0, 1.0])
-    rows, found, t = RowTimes(0.25, 2.1, 4, MPI.COMM_SELF), [], 0.0
+    rows, found, t = RowTimes(multiples(0.25, 2.1), 4, MPI.COMM_SELF), [], 0.0
     for h in (0.1, 0.15, 0.9, 0.05, 0.9):
         old, new = of_polynomial(p, t), of_polynomial(p, t := t + h)
         rows(old, new, Leg(t, h))

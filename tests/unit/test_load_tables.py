@@ -46,7 +46,7 @@ REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
         {},
         "one component",
     ),
-    "no list": ({"at": {"x": 1.0, "force": [0, 1]}}, {}, "list of tables"),
+    "no list": ({"at": {"x": 1.0, "force": [0, 1]}}, {}, "must be a list"),
     "no frequency": ({"tip_force": {"harmonic": {"amplitude": [0, 1]}}}, {}, "frequency and per_rev"),
     "no amplitude": ({"tip_force": {"harmonic": {"frequency": 1.0}}}, {}, "amplitude"),
     "per rev of a free hub": (
@@ -92,7 +92,7 @@ def test_tables_from_files(tmp_path: Any) -> None:
     assert read is not None
     assert read.over_span == ((0, 0, 1, 0), (5, 0, 2, 0), (5, 0, 3, 0), (10, 0, 4, 0))
     (tmp_path / "span.csv").write_text("0, 0, 1\n5, 0, 2\n4, 0, 3\n")
-    with pytest.raises(SceneError, match="line 3: 4 < 5"):
+    with pytest.raises(SceneError, match="row 3: 4 < 5"):
         Scene.from_dict(tables, directory=tmp_path)
 
 

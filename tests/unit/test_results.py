@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rotfem.errors import OutputError
-from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, whole_hdf5, write_text
+from rotfem.results.files import csv_text, json_text, read_csv, whole_hdf5, write_text
 from rotfem.results.run import RunResult, Table
 from rotfem.version import __version__
 
@@ -90,11 +90,3 @@ def test_files_get_the_usual_permissions(tmp_path: Path) -> None:
     finally:
         os.umask(before)
     assert path.stat().st_mode & 0o777 == 0o640
-
-
-def test_prepare_folder(tmp_path: Path) -> None:
-    assert prepare_folder(tmp_path / "a" / "b").is_dir()
-    assert os.listdir(tmp_path / "a" / "b") == []
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"file/below.*cannot be written.*-o DIR"):
-        prepare_folder(tmp_path / "file" / "below")

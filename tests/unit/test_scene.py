@@ -318,12 +318,12 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"structure__length": 0}, "structure.length", "greater than 0"),
         ("planar", {"structure__length": float("nan")}, "structure.length", "finite"),
         ("planar", {"structure__length": float("inf")}, "structure.length", "finite"),
-        ("planar", {"structure__length": 10**400}, "structure.length", "finite"),
+        ("planar", {"structure__length": 10**400}, "structure.length", "must be a number"),
         ("planar", {"structure__length": "10"}, "structure.length", "must be a number"),
         ("planar", {"structure__length": True}, "structure.length", "must be a number"),
         ("planar", {"structure__tip_mass": -1}, "structure.tip_mass", "at least 0"),
         ("planar", {"structure__hub_offset": [0, 0, 0]}, "structure.hub_offset", "unknown key"),
-        ("planar", {"structure__section__EA": False}, "structure.section.EA", "must be a number greater than 0"),
+        ("planar", {"structure__section__EA": False}, "structure.section.EA", "must be a number"),
         ("planar", {"structure__section__EA": [[0, 1], [9, 1]]}, "structure.section.EA", "it ends at 9"),
         (
             "planar",
@@ -335,13 +335,13 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"structure": {}}, "structure.type", "required key is missing"),
         ("planar", {"structure": 3}, "structure", "must be a table"),
         ("planar", {"structure": {"type": "planar_beam", "section": SECTION}}, "structure.length", "required key"),
-        ("planar", {"structure__damping__rayleigh": [0, -1]}, "structure.damping.rayleigh", "at least 0"),
+        ("planar", {"structure__damping__rayleigh": [0, -1]}, "structure.damping.rayleigh.1", "at least 0"),
         ("planar", {"structure__damping": 0.1}, "structure.damping", "must be a table"),
         ("planar", {"motion__type": "constnat"}, "motion.type", 'did you mean "constant"?'),
         ("planar", {"motion": {"type": "constant"}}, "motion.speed", "required key is missing"),
         ("planar", {"motion__axis": [0, 0, 0]}, "motion.axis", "must be a direction"),
         ("planar", {"motion__axis": [0, 1, 0]}, "motion.axis", "planar_beam"),
-        ("planar", {"motion__axis": [0, 1]}, "motion.axis", "3 numbers"),
+        ("planar", {"motion__axis": [0, 1]}, "motion.axis", "more entries"),
         ("planar", {"motion__base_acceleration": [0, 0, 1]}, "motion.base_acceleration", "third component"),
         ("planar", {"motion": SPIN_UP | {"duration": 0}}, "motion.duration", "greater than 0"),
         ("planar", {"motion": {"type": "table", "table": [[0, 1], [0, 2]]}}, "motion.table", "increase strictly"),
@@ -390,15 +390,15 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"mesh__degree": 7}, "mesh.degree", "at most 6"),
         ("planar", {"mesh__cell": "triangle"}, "mesh.cell", "unknown key"),
         ("plate", {"mesh__cell": "triangel"}, "mesh.cell", 'did you mean "triangle"?'),
-        ("plate", {"mesh__elements": [2, 0]}, "mesh.elements", "at least 1"),
+        ("plate", {"mesh__elements": [2, 0]}, "mesh.elements.1", "at least 1"),
         ("planar", {"time": {"end": 1.0}}, "time.step", "exactly one"),
         ("planar", {"time": TIME | {"tolerance": 1e-3}}, "time.step", "exactly one"),
         ("planar", {"time": {"step": 0.1}}, "time.end", "required key is missing"),
         ("planar", {"time": TIME | {"step": 0}}, "time.step", "greater than 0"),
         ("planar", {"time": TIME | {"step": 2}}, "time.step", "at most time.end"),
         ("planar", {"time": TIME | {"max_step": 1}}, "time.max_step", "only with tolerance"),
-        ("planar", {"time": TIME | {"breakpoints": [-1]}}, "time.breakpoints", "list of times"),
-        ("planar", {"time": TIME | {"breakpoints": 0.5}}, "time.breakpoints", "list of times"),
+        ("planar", {"time": TIME | {"breakpoints": [-1]}}, "time.breakpoints.0", "at least 0"),
+        ("planar", {"time": TIME | {"breakpoints": 0.5}}, "time.breakpoints", "must be a list"),
         (
             "planar",
             {"time": {"end": 1, "tolerance": 1e-3, "min_step": 0.2, "max_step": 0.1}},
@@ -427,10 +427,10 @@ TIME = {"end": 1.0, "step": 0.1}
         ("plate", {"structure__E1": 1e9}, "structure", "cannot be combined"),
         ("plate", {"structure__thickness": {"skin": 0.1}}, "structure.thickness", "needs a mesh"),
         ("plate", {"structure__thickness": [[0, 0.1], [2, 0.1]]}, "structure.thickness", "it ends at 2"),
-        ("plate", {"structure__thickness": [[0, 0.1], [1, 0]]}, "structure.thickness", "greater than 0"),
+        ("plate", {"structure__thickness": [[0, 0.1], [1, 0]]}, "structure.thickness.1.1", "greater than 0"),
         ("plate", {"structure__mesh": "no.msh"}, "structure.mesh", "file not found"),
         ("plate", {"structure__point_masses": [[2, 0, 1]]}, "structure.point_masses", "not on the plate"),
-        ("plate", {"structure__point_masses": [[0, 0, -1]]}, "structure.point_masses", "greater than 0"),
+        ("plate", {"structure__point_masses": [[0, 0, -1]]}, "structure.point_masses.0.2", "greater than 0"),
         ("plate", {"structure__line_masses": {"tip": 0}}, "structure.line_masses.tip", "greater than 0"),
         ("plate", {"structure__line_masses": {"tip": "1"}}, "structure.line_masses.tip", "must be a number"),
         ("plate", {"structure__line_masses": 1.0}, "structure.line_masses", "must be a table"),
@@ -470,7 +470,7 @@ def test_all_problems_are_listed() -> None:
     assert [problem.key for problem in error.problems] == ["structure.length", "model.theory", "mesh.elements"]
     first, *others = str(error).splitlines()
     assert first.endswith("(and 2 more)")
-    assert others[1].strip() == "mesh.elements = 0: must be an integer at least 1"
+    assert others[1].strip() == "mesh.elements = 0: must be at least 1"
 
 
 # --- files and overrides --------------------------------------------------------------------------------------------
@@ -578,7 +578,7 @@ def test_relative_paths_start_at_the_scene(tmp_path: Path, monkeypatch: pytest.M
     ("content", "message"),
     [
         ("0, 0\n1, x\n", "line 2"),
-        ("0, 0, 0\n1, 1, 1\n", "3 entries"),
+        ("0, 0, 0\n1, 1, 1\n", "at most 2 entries"),
         ("t, w\n", "no row of numbers"),
         ("0, 0\n0, 1\n", "strictly"),
     ],
@@ -588,7 +588,7 @@ def test_bad_csv(tmp_path: Path, content: str, message: str) -> None:
     data = tables(motion={"type": "table", "table": "speed.csv"})
     with pytest.raises(SceneError, match=message) as caught:
         Scene.from_dict(data, directory=tmp_path)
-    assert caught.value.key == "motion.table"
+    assert caught.value.key.startswith("motion.table")
 
 
 # --- the errors themselves ------------------------------------------------------------------------------------------

@@ -115,21 +115,21 @@ def test_taper_end_tolerance() -> None:
     ("taper", "message"),
     [
         ([[0, 1]], "at least two rows"),
-        ([], "must be a taper"),
+        ([], "at least two rows"),
         ([[0.1, 1], [2, 1]], "must start at x = 0"),
         ([[0, 1], [1, 1], [1, 2], [2, 2]], "increase strictly"),
         ([[0, 1], [2, 0]], "greater than 0"),
         ([[0, 1], [2, float("nan")]], "finite"),
         ([[0, 1], [2, True]], "must be a number"),
-        ([[0, 1], [2]], "row 2 has 1 entries"),
-        ([[0, 1, 2], [2, 1, 2]], "row 1 has 3 entries"),
-        ([0, 1], "must be a taper"),
+        ([[0, 1], [2]], "more entries than 1"),
+        ([[0, 1, 2], [2, 1, 2]], "at most 2 entries"),
+        ([0, 1], "must be a list"),
     ],
 )
 def test_bad_tapers(taper: list[Any], message: str) -> None:
     with pytest.raises(SceneError, match=message) as caught:
         planar(EA=taper, GA=2, EI=3, mass_per_length=4)
-    assert caught.value.key == "structure.section.EA"
+    assert caught.value.key.startswith("structure.section.EA")
 
 
 @pytest.mark.parametrize(
@@ -355,8 +355,8 @@ def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
         (BLADE_CSV.replace(", -0.5", ""), {"file": "blade.csv"}, "line 4 has 9 columns; must be 10"),
         (BLADE_CSV.replace("\n2,", "\n1,"), {"file": "blade.csv"}, "it ends at 1"),
         ("0, 3\n2, 1", {"file": "blade.csv"}, "its first row must name the columns"),
-        (BLADE_CSV, {"EA": "blade.csv"}, r"section\.EA.*must be a table \[\[x, value\], …\]; line 3 has 10 entries"),
-        (BLADE_CSV, {"stiffness": "blade.csv"}, r"section\.stiffness.*must be x and 36 entries"),
+        (BLADE_CSV, {"EA": "blade.csv"}, r"section\.EA.*must have at most 2 entries"),
+        (BLADE_CSV, {"stiffness": "blade.csv"}, r"section\.stiffness.*must be a symmetric 6×6"),
         (BLADE_CSV, {"file": "none.csv"}, r"section\.file.*file not found"),
         (BLADE_CSV, {"file": 1}, r"section\.file.*must be the path of a file"),
     ],

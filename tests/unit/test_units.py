@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
@@ -11,7 +11,7 @@ from rotfem import Scene, SceneError
 from rotfem.commands.campbell import parse_speeds
 from rotfem.results.columns import ShownUnits
 from rotfem.scene import beams, loads, motion, plates, root, section, settings, structure
-from rotfem.scene.table import has_unit
+from rotfem.scene.table import in_units
 from rotfem.units import quantity
 
 BEAM: dict[str, Any] = {
@@ -102,7 +102,6 @@ def test_region_and_type_decide():
     found = Scene.from_dict(tables)
     assert found.structure.thickness == ((0.0, 3e-3), (1.0, 1e-3))
     assert found.loads.distributed.value == (0.0, 0.0, 2e3)
-    assert plates.Modulus.__metadata__[-1].read({"root": "3 Pa"}) == {"root": 3.0}
     with pytest.raises(SceneError, match="'kPa' is no unit of the kind of N/m"):
         Scene.from_dict(BEAM | {"loads": {"distributed": [0, "2 kPa"]}})
     table = {"motion": {"type": "table", "table": [[0, 0], ["1 s", "60 rpm"]]}}
@@ -128,6 +127,11 @@ TABLES = (
     *(motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion),
     *(settings.Initial, settings.Time, loads.PointLoad, loads.Loads),
 )
+
+
+def has_unit(kind: Any) -> bool:
+    """Return whether a type says a unit."""
+    return getattr(getattr(kind, "func", None), "func", None) is in_units or any(map(has_unit, get_args(kind)))
 
 
 @pytest.mark.parametrize("table", TABLES)

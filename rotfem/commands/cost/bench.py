@@ -6,7 +6,6 @@ import ctypes
 import gc
 import hashlib
 import json
-import os
 import resource
 from collections.abc import Callable
 from contextlib import suppress
@@ -32,7 +31,7 @@ from rotfem.listeners import cpu_time
 from rotfem.refinement.coarser import lines
 from rotfem.refinement.distance import of_columns
 from rotfem.refinement.refine import Clock, OverBudget, Setting
-from rotfem.results.files import opened, writing
+from rotfem.results.files import writing
 from rotfem.scene import Scene
 from rotfem.version import __version__
 
@@ -281,9 +280,8 @@ class Record:
     def _append(self, text: str) -> None:
         if self.path is None:
             return
-        with writing(self.path), opened(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT) as descriptor:
-            os.write(descriptor, text.encode())
-            os.fsync(descriptor)
+        with writing(self.path), open(self.path, "ab", buffering=0) as file:
+            file.write(text.encode())
 
 
 # --- memory ----------------------------------------------------------------------------------------------------------

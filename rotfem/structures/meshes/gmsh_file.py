@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -128,6 +126,9 @@ class Cells:
         Raises:
             BadMesh: says where it is, and of how many cells.
         """
+        from scipy.sparse import coo_array  # slow to load, and only mesh files need it
+        from scipy.sparse.csgraph import connected_components
+
         keys, cells, first, count = self._edges
         a, b = self._pairs()
         size = len(self.corners)

@@ -113,8 +113,7 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] 
 
 
 def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
-    """Return the mesh of a gmsh file: physical curves (one is "clamped") and the physical surface "plate" or regions.
-    """
+    """Return the mesh of a gmsh file: physical curves, "clamped" among them, and the surface "plate" or regions."""
     import gmsh
 
     groups: dict[int, dict[str, int]] = {}
