@@ -253,7 +253,7 @@ class ProgressBar:
     def __init__(self, title: str = "", wanted: bool = False):
         self._title, self._wanted = title, wanted
         self._bar: Any = None
-        self._log = logging.getLogger("rotfem.compilation")
+        self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
         self._started, self._due = monotonic(), LONG
         #: When (s after the start) the first share was done, and that share.
         self._first: tuple[float, float] | None = None
@@ -270,7 +270,6 @@ class ProgressBar:
         self._bar = Progress(*columns, percent, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
         self._bar.add_task(self._title, total=None, percent="")
         self._bar.start()
-        self._log.setLevel(logging.INFO)
         self._log.addFilter(self._heard)
 
     def stop(self) -> None:
@@ -281,9 +280,10 @@ class ProgressBar:
             self._log.removeFilter(self._heard)
 
     def _heard(self, record: logging.LogRecord) -> bool:
-        """Say in the bar what a log says, and nowhere else."""
-        self.describe(record.getMessage())
-        return False
+        """Say in the bar that something is compiled, where FFCx's log says so, and nowhere else."""
+        if "Compiler stage" in record.getMessage():
+            self.describe("compiling (first run only)")
+        return record.levelno > logging.INFO
 
     def describe(self, what: str) -> None:
         """Say what is being done."""

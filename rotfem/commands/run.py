@@ -305,7 +305,6 @@ class Simulation:
             "theory": self.problem.theory.name,
             "frame": self.problem.frame,
             "effects": list(system.model.effects),
-            "integrals": system.integrals,
             "dofs": space.index_map.size_global * space.index_map_bs,
             "elements": mesh.topology.index_map(mesh.topology.dim).size_global,
             "steps": log.steps,
