@@ -185,7 +185,7 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         parts: whether errors of steps and mesh are wanted one by one.
     """
     scene, setting, scale = answers.scene, own.setting, own.output.scale
-    out = Errors({}, scale=scale, each=[None] * len(own.output.values))
+    out = Errors({}, scale=scale, each=[None] * len(own.output.values) if isinstance(own.output, Spectrum) else [])
     other = coarser(setting, scene)
     if parts and setting.moving and scene.time is not None:
         _compare(out, "time", answers, own, in_longer_steps(setting, scene.time.end))
@@ -194,6 +194,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         found = _compare(out, "discretisation" if setting.moving else "space", answers, own, other)
         if found is not None and other is not None:
             _fill_table(out, own, found, other)
+    if (lost := own.outcome.round_off) is not None:
+        out.parts["round_off"] = lost
     if not registry.theories[setting.theory].exact:
         out.parts["model"] = of_theory(out, answers, own, (other or on_fewer_cells(setting)).setting)
     return out
@@ -325,7 +327,7 @@ def table_lines(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
-    """Return what is to be known of an error: what is unknown, and how to reduce a large one."""
+    """Return what is to be known of an error: what is unknown, and how to reduce a large one (rows say that of modes)."""
     said = [f"the error is unknown: {why}" for why in errors.unknown]
     model = errors.parts.get("model") or 0.0
     if model > OUT_OF_RANGE:
@@ -333,7 +335,7 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
         said.append(f'model.theory = "{own.theory}" is {how} here; "{_exact_name(scene)}" is exact')
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
     allowed = max(NOTICED, own.tolerance or 0.0)
-    if rest > allowed:
+    if rest > allowed and not errors.each:
         cures = ["a higher mesh.degree" if own.elements is None else "more mesh.elements"]
         if own.step is not None:
             cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")
