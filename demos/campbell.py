@@ -29,7 +29,7 @@ def main(figure: Path | None = None) -> float:
     """Return the speed (rad/s) at which the first frequency is that of the rotation."""
     result = rotfem.campbell(SCENE, "0:10:21")
     summary = result.summary
-    say(f"{summary['speeds']} speeds asked for, {summary['speeds_solved']} solved")
+    say(f"{summary['speeds']} speeds asked for, {summary['speeds_inserted']} inserted to follow the modes")
     for name, branch in result.branches().items():
         shares = branch["share_lag"]
         say(

@@ -199,7 +199,10 @@ class ModalAnalysis:
         estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
+        is_model: whether it is a model of itself between speeds (see `rotfem.analysis.branches.Model`).
     """
+
+    is_model = False
 
     def __init__(
         self,
@@ -254,13 +257,8 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        matrices = self.system.mass_damping_stiffness(keep)
-        if self.fixed is not None:
-            matrices = self.fixed(matrices, speed)
-        clamped = Pencil(*matrices)
-        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        pencil, clamped = self._pencils(speed, keep)
         t2 = perf_counter()
-        clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.near, pencil.factor = near, self.system.analysed
@@ -286,6 +284,25 @@ class ModalAnalysis:
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
         return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
+
+    def _pencils(self, speed: float, keep: bool) -> tuple[Pencil, Pencil]:
+        """Return the pencil at the state and speed (rad/s) that are set, and the same with the hub held."""
+        matrices = self.system.mass_damping_stiffness(keep)
+        if self.fixed is not None:
+            matrices = self.fixed(matrices, speed)
+        clamped = Pencil(*matrices)
+        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        clamped.unit = pencil.unit = self._unit
+        return pencil, clamped
+
+    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool) -> Spinning:
+        """Return what `at` has found at a speed (rad/s): equilibrium q, pairs, and whether the hub turns freely."""
+        held = self.system.held
+        held.set_time(0.0, held.motion.at_speed(speed))
+        held.set_state(q)
+        pencil, clamped = self._pencils(speed, keep=True)
+        clamped.owner = pencil.owner = self
+        return Spinning(speed, q, pencil, pairs, clamped, rigid)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.

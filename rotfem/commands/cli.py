@@ -103,8 +103,14 @@ def campbell(
     operating: Annotated[
         str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range to mark: 6.9:12.1rpm")
     ] = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="solve no other speeds; critical speeds are interpolated between them")
+    ] = False,
 ) -> None:
-    """Compute the Campbell diagram and critical speeds of SCENE."""
+    """Compute the Campbell diagram and critical speeds of SCENE.
+
+    Of one that was interrupted the finished speeds are kept; the same command goes on from there.
+    """
     from rotfem.commands.campbell import campbell as sweep
 
     marks: dict[str, Any] = {
@@ -112,7 +118,8 @@ def campbell(
         "rated": None if rated is None else speeds_of("--rated", rated, 1)[0],
         "operating": None if operating is None else speeds_of("--operating", operating, 2),
     }
-    result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks, progress=todo.progress, hint=todo.hint)
+    marks |= {"only": only, "folder": todo.results.path, "progress": todo.progress, "hint": todo.hint}
+    result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks)
     todo.finish(result)
 
 

@@ -57,8 +57,9 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 
 def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `campbell` prints before and after its tables."""
+    inserted = f", {s['speeds_inserted']} inserted to follow the modes" * bool(s["speeds_inserted"])
     line = (
-        f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds ({s['speeds_solved']} solved to follow the modes), "
+        f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds{inserted}, "
         f"{s['dofs']} unknowns, in {s['timings']['total']:.2f} s"
     )
     return [line, *accuracy_report(s)], []

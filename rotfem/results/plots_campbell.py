@@ -134,7 +134,7 @@ def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
         further = [
             (c.speed, seen_fixed(c) if fixed else c.frequency)
             for c in result.critical_speeds
-            if c.branch == number and c.kind != "per_rev" and c.speed not in speed
+            if c.branch == number and not (fixed and c.kind == "per_rev") and c.speed not in speed
         ]
         at = np.searchsorted(speed, [s for s, _ in further])
         out.append(

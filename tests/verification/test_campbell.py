@@ -14,6 +14,7 @@ import pytest
 from rotfem import SceneError, campbell, modes
 from rotfem.analysis.branches import AMBIGUOUS, SURE
 from rotfem.commands.campbell import parse_speeds
+from rotfem.errors import Stopped
 from rotfem.results import CampbellResult
 
 Array = npt.NDArray[np.float64]
@@ -104,8 +105,8 @@ def test_veering_branches_do_not_swap(
             assert np.all(np.diff([table[branch][speed] for branch in range(1, 7)]) > 0)
         assert result.summary["ambiguous"] == []
         assert min(row["confidence"] for row in result.rows) >= SURE - 1e-12
-    veerings, solved = exchanges(fine) // 2, coarse.summary["speeds_solved"]
-    print(f"E {theory}: {compared} values compared, {veerings} veerings, {solved} solves for 9 speeds")
+        assert result.summary["speeds_inserted"] == 0
+    print(f"E {theory}: {compared} values compared, {exchanges(fine) // 2} veerings")
 
 
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
@@ -140,6 +141,44 @@ def test_branches_are_the_modes_of_their_speed(unit_beam: Any) -> None:
     assert all(row["residual"] < 1e-8 for row in result.rows)
 
 
+def test_speeds_that_are_finished_are_not_solved_again(unit_beam: Any, tmp_path: Path) -> None:
+    """Interrupted after three of five speeds: the diagram of three, and then all of it by three solutions less."""
+
+    def interrupt(share: float) -> None:
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    beam = scene(unit_beam, "reissner", 20, 1.0)
+    with pytest.raises(Stopped) as stop:
+        campbell(beam, "0:12:5", folder=tmp_path, progress=interrupt)
+    until = stop.value.result
+    assert until.summary["status"] == "interrupted"
+    assert list(until.speeds) == [0.0, 3.0, 6.0]
+    assert any(text.startswith("3 of 5 speeds are finished, up to 6 rad/s") for text in until.summary["warnings"])
+    other = campbell(beam.replace({"modes.count": 5}), "0:12:5", folder=tmp_path)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(Stopped):
+        campbell(beam, "0:12:5", folder=tmp_path, progress=interrupt)
+    rest, whole = campbell(beam, "0:12:5", folder=tmp_path), campbell(beam, "0:12:5")
+    assert not list(tmp_path.iterdir())
+    assert rest.summary["speeds_solved"] == whole.summary["speeds_solved"] - 3
+    assert other.summary["speeds_solved"] >= 5
+    np.testing.assert_allclose(rest.frequencies, whole.frequencies, rtol=1e-10)
+    found, expected = ([c.speed for c in r.critical_speeds] for r in (rest, whole))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_only_the_speeds_that_are_asked_for(unit_beam: Any) -> None:
+    """Critical speeds are interpolated then, 2 rad/s apart to 1e-3; the branches are those of a whole diagram."""
+    beam = scene(unit_beam, "reissner", 20, 1.0)
+    few, whole = (campbell(beam, "0:12:7", only=only) for only in (True, False))
+    assert few.summary["speeds_solved"] == 7
+    np.testing.assert_array_equal(few.frequencies, whole.frequencies)
+    pairs = zip(few.critical_speeds, whole.critical_speeds, strict=True)
+    assert max(abs(a.speed / b.speed - 1.0) for a, b in pairs) < 1e-3
+    assert any("interpolated" in text for text in few.summary["warnings"])
+
+
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_a_hinge_that_nothing_holds_is_one_branch(spin_up: Any, theory: str) -> None:
     """On the axis its frequency is zero at any speed, to round-off: no reason to solve others than those asked for."""
@@ -152,8 +191,9 @@ def test_a_hinge_that_nothing_holds_is_one_branch(spin_up: Any, theory: str) -> 
 
 def test_lost_and_ambiguous_branches_are_said_to_be(unit_beam: Any) -> None:
     """consistent_linear beyond N0 = GA_s, the end of the theory: short waves come in at once and push branches out."""
-    result = campbell(scene(unit_beam, "consistent_linear", 30, 0.0), "0:40:9", orders=0)
+    result = campbell(scene(unit_beam, "consistent_linear", 30, 0.0), "0:40:2", orders=0)
     summary = result.summary
+    assert summary["speeds_inserted"] <= 2 + 4
     lost = [b["label"] for b in summary["branches"] if b["frequency_last"] is None]
     assert lost
     for label in lost:
