@@ -1,7 +1,7 @@
 """Answers that are modes at one speed: their eigenvalues, paired by their shapes, and bounds of round-off.
 
-The error by the mesh of every mode follows from the distance to the most similar one on half the cells, that of the
-theory from the richest theory there. Of an eigenvalue that is zero to round-off both are relative to the smallest other.
+The error by the mesh of every mode follows from the distance to the most similar one on half the cells. Of an
+eigenvalue that is zero to round-off it is relative to the smallest other one.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
 from rotfem.accuracy.errors import Errors, estimate
+from rotfem.accuracy.outputs import lines
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Spectrum, sizes
@@ -50,13 +51,20 @@ class Modes:
     @property
     def output(self) -> Spectrum:
         """Eigenvalues and shapes."""
-        return Spectrum(self.spinning.pairs.resolved, sampled(self.analysis, self.spinning.pairs.right), self.count)
+        return Spectrum(
+            self.spinning.pairs.resolved, sampled(self.analysis, self.analysis.right(self.spinning)), self.count
+        )
 
     @property
     def round_off(self) -> float:
         """Bound of the error of the eigenvalues by round-off."""
         pairs = self.spinning.pairs
         return round_off(pairs.values[: self.count], pairs.bounds[: self.count])
+
+    @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of the vertices along each axis."""
+        return lines(self.analysis.system)
 
     def result(self) -> Any:
         """Return the whole result."""
@@ -67,7 +75,7 @@ def sampled(analysis: ModalAnalysis, vectors: Array) -> Array:
     """Return eigenvectors at places that are the same on every mesh, (modes, samples); nan outside of it."""
     columns = [analysis.structure.nodes(x) for x in vectors.T]
     coordinates = np.column_stack(list(columns[0][0].values()))
-    values = np.hstack([found for _, found in columns])
+    values = np.hstack([q for _, q in columns])
     low, high = coordinates.min(axis=0), coordinates.max(axis=0)
     if coordinates.shape[1] == 1:
         at = np.linspace(low[0], high[0], ALONG)
@@ -76,7 +84,9 @@ def sampled(analysis: ModalAnalysis, vectors: Array) -> Array:
         from scipy.interpolate import LinearNDInterpolator
 
         x, y = (np.linspace(a, b, n) for a, b, n in zip(low, high, (ALONG, ACROSS), strict=True))
-        there = LinearNDInterpolator(coordinates, values, rescale=True)(*np.meshgrid(x, y)).reshape(-1, values.shape[1]).T
+        there = (
+            LinearNDInterpolator(coordinates, values, rescale=True)(*np.meshgrid(x, y)).reshape(-1, values.shape[1]).T
+        )
     lever = np.tile(analysis.structure.lever, vectors.shape[1])
     return np.asarray((there * lever[:, None]).reshape(vectors.shape[1], -1))
 
@@ -117,10 +127,20 @@ def modal_answers(
     return Answers(scene, compute, moving=False)
 
 
-def modal_errors(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> Errors:
-    """Return the error of modes at one speed; `each` is that of every pair by the mesh."""
-    own = Modes(analysis, spinning, len(spinning.pairs.values))
+def modal_errors(
+    scene: Scene, analysis: ModalAnalysis, spinning: Spinning, solved: Any = None, seconds: float = 0.0
+) -> Errors:
+    """Return the error of modes at one speed; `each` is that of every pair by the mesh.
+
+    Args:
+        scene: of the modes.
+        analysis: of it.
+        spinning: the modes.
+        solved: analysis in a basis that they were computed by, if they were.
+        seconds: CPU time that they took, s; 0 if that is not known.
+    """
+    own = Modes(solved or analysis, spinning, len(spinning.pairs.values))
     setting = Setting.of(scene, moving=False)
     degree = analysis.system.V.element.basix_element.degree  # a default differs by cell
-    answer = Answer(replace(setting, degree=degree), own, 0.0)
+    answer = Answer(replace(setting, degree=degree), own, seconds)
     return estimate(modal_answers(scene, analysis, spinning.speed), answer)

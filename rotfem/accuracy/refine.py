@@ -18,7 +18,6 @@ from rotfem.accuracy.errors import ASYMPTOTIC, Errors, attempt, of_theory, row
 from rotfem.accuracy.ladder import TOLERANCES, ladder
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
-
 from rotfem.results.distance import Spectrum
 
 #: Factor of an extrapolated error.
@@ -252,7 +251,7 @@ def chosen_theory(answers: Answers, first: Answer, accuracy: float) -> tuple[str
     scene, own = answers.scene, registry.theories[first.setting.theory]
     if not own.exact:
         errors = Errors({})
-        return own.name, _Model({"model": of_theory(errors, answers, first, first.setting)}, tuple(errors.unknown))
+        return own.name, _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))
     length = scene.structure.length
     if answers.moving and scene.accuracy_of != "root_moment" and length and first.output.scale <= accuracy * length:
         kind = scene.structure.type

@@ -31,7 +31,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.advice import frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, theory_error
+from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem, loads_of
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
@@ -235,7 +235,7 @@ def result_of(
             row |= {name: float(abs(d)), f"{name}_phase": float(np.angle(d)), f"{name}_modal": float(abs(m))}
         rows.append(row | {"difference": float(o), "worst_difference": float(w), "peak": int(peak)})
     modes = mode_rows(analysis, spinning)
-    stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     warnings = [
         *frozen_in_frame(analysis.problem),
         *analysis.notes,
@@ -244,7 +244,6 @@ def result_of(
         *doubtful(modes),
     ]
     warnings += [stability.warning()] if not stability.stable else []
-    warnings += [theory.warning()] if theory and theory.warning() else []
     usual = float(np.median(off))
     warnings += remarks(modes, undamped, usual, scene.modes.count)
     warnings += [
@@ -253,7 +252,7 @@ def result_of(
         if value is not None
     ]
     summary = {
-        **modal_summary("response", analysis, scene, started, theory),
+        **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,
