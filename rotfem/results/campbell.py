@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import ShortTable, ShownUnits, number, numbers
-from rotfem.results.files import json_text, rows_text
-from rotfem.results.result import Array, Rows, Variables
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
+from rotfem.results.files import json_text
+from rotfem.results.result import Array, Rows
 
 
 @dataclass(frozen=True)
@@ -115,38 +115,19 @@ class CampbellResult(Rows):
     def _refined(self) -> dict[float, bool]:
         return {row["speed"]: bool(row["refined"]) for row in self.rows}
 
-    def _numbers(self) -> list[str]:
-        own = ("speed", "branch", "refined")
-        return [k for k, v in self.rows[0].items() if isinstance(v, int | float) and k not in own]
-
-    def column(self, name: str) -> Array:
-        """Return a number of every mode, such as `residual`, shape (speeds, branches), NaN where a branch is lost.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        if name not in self._numbers():
-            raise KeyError(f"no number {name!r} of the branches; there are {', '.join(self._numbers())}")
-        place = {speed: i for i, speed in enumerate(self._refined())}
-        out = np.full((len(place), len(self.labels)), np.nan)
-        for row in self.rows:
-            out[place[row["speed"]], row["branch"] - 1] = row[name]
-        return out
-
     def branches(self) -> dict[str, dict[str, Array]]:
-        """Return label ↦ columns `speed`, `frequency`, `growth`, … over all speeds solved."""
+        """Return label ↦ columns `speed`, `frequency`, `growth`, … over the speeds at which the branch was found."""
         out: dict[str, dict[str, Array]] = {}
         for label in dict.fromkeys(row["label"] for row in self.rows):
-            mine = [row for row in self.rows if row["label"] == label]
-            numbers = [k for k, v in mine[0].items() if isinstance(v, int | float)]
-            out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
+            mine = Columns.of_rows([row for row in self.rows if row["label"] == label])
+            out[label] = {name: mine.array(name).astype(np.float64) for name in mine.numbers}
         return out
 
     def texts(self) -> dict[str, str]:
         """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
-            "campbell.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
+            **super().texts(),
             "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
         }
 
@@ -182,12 +163,3 @@ class CampbellResult(Rows):
         if critical:
             out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
         return out
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
-
-        NaN where a branch is lost; `refined` marks the speeds that were not asked for.
-        """
-        coordinates: Variables = {"speed": (("speed",), self.speeds), "refined": (("speed",), self.refined)}
-        coordinates["branch"] = ("branch",), np.array(self.labels, dtype=str)
-        return {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}, coordinates

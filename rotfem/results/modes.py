@@ -15,9 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.results.columns import ShortTable, ShownUnits, by_unit, in_unit, named, number, numbers, per_cent
-from rotfem.results.files import csv_text, json_text, rows_text
-from rotfem.results.result import Array, Rows, Variables, column_of_rows, nodes_of
+from rotfem.results.columns import (
+    Columns,
+    ShortTable,
+    ShownUnits,
+    Variables,
+    by_unit,
+    in_unit,
+    named,
+    number,
+    numbers,
+    per_cent,
+)
+from rotfem.results.files import json_text
+from rotfem.results.result import Array, Rows
 from rotfem.results.surfaces import Surface
 
 #: Powers of ξ in a mode polynomial.
@@ -148,29 +159,32 @@ class ModesResult(Rows):
         said = [f"{units.frequencies(row['frequency']):.5g} {units.frequency}" for row in rows]
         return list(zip(rows, self.shapes.values(), said, strict=True))
 
-    def texts(self) -> dict[str, str]:
-        """Return modes.csv, mode_shapes.csv, modes.json, and what else is wanted.
+    def data(self) -> dict[str, Columns]:
+        """Return the modes, their shapes, and the tables that are wanted.
 
         Raises:
             InputError: tables over the span are wanted of a plate.
         """
-        shapes, blade_files = dict[str, Array](), dict[str, str]()
-        if self.blade_tables:
-            fitted = self.mode_polynomials()
-            blade_files = {
-                "mode_table.csv": rows_text(self.mode_table()),
-                "mode_polynomials.csv": rows_text(fitted),
-                "elastodyn_modes.dat": elastodyn_lines(fitted),
-            }
+        shapes = dict[str, Array]()
         for i, columns in enumerate(self.shapes.values(), start=1):
             shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
-        return {
-            **({"sensitivities.csv": rows_text(self.sensitivities)} if self.sensitivities else {}),
-            **blade_files,
-            "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
-            "mode_shapes.csv": csv_text(shapes),
-            "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
-        }
+        out = {**super().data(), "mode_shapes": Columns(shapes, dimension="node")}
+        if self.sensitivities:
+            out["sensitivities"] = Columns.of_rows(self.sensitivities)
+        if self.blade_tables:
+            out["mode_table"] = Columns.of_rows(self.mode_table())
+            out["mode_polynomials"] = Columns.of_rows(self.mode_polynomials())
+        return out
+
+    def texts(self) -> dict[str, str]:
+        """Return a CSV file of each table, modes.json, and elastodyn_modes.dat where it is wanted.
+
+        Raises:
+            InputError: tables over the span are wanted of a plate.
+        """
+        fitted = {"elastodyn_modes.dat": elastodyn_lines(self.mode_polynomials())} if self.blade_tables else {}
+        modes = json_text({"speed": self.summary["speed"], "modes": self.rows})
+        return {**super().texts(), **fitted, "modes.json": modes}
 
     def _of_beam(self) -> Iterator[tuple[dict[str, Any], dict[str, Array], dict[str, tuple[Array, Array]]]]:
         """Yield of every mode with a shape its number and names, real columns, and direction ↦ displacement, slope."""
@@ -256,26 +270,20 @@ class ModesResult(Rows):
         head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
         return [ShortTable(head, list(zip(*columns, strict=True)))]
 
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the columns of modes.csv over `mode`, and the shapes over `mode` and `node`.
+    def arrays(self) -> Variables:
+        """Return the columns of modes.csv over `mode`, the speed (rad/s), and the shapes over `mode` and `node`.
 
-        Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none.
-        Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
+        Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none. Nodes have
+        `x` (m), of a plate `y` and `triangles` too.
         """
-        names = [name for name in (self.rows[0] if self.rows else ()) if name not in ("mode", "label")]
-        over: Variables = {name: (("mode",), column_of_rows(self.rows, name)) for name in names}
-        coordinates: Variables = {
-            "mode": (("mode",), np.array([row["mode"] for row in self.rows], dtype=np.int64)),
-            "label": (("mode",), np.array(self.labels, dtype=str)),
-            "speed": ((), np.array(self.speed)),
-        }
-        first = next(iter(self.shapes.values()), {})
+        out = super().arrays() | {"speed": ((), np.array(self.speed))}
+        first, rigid = next(iter(self.shapes.values()), {}), len(self.rows) - len(self.shapes)
+        out |= {name: (("node",), first[name]) for name in ("x", "y") if name in first}
         for name in (name for name in first if f"{name}_imag" in first):
             values = np.full((len(self.rows), len(first[name])), np.nan, dtype=np.complex128)
-            for i, columns in enumerate(self.shapes.values(), start=len(self.rows) - len(self.shapes)):
-                values[i] = columns[name] + 1j * columns[f"{name}_imag"]
-            over[f"shape_{name}"] = (("mode", "node"), values)
-        return over, coordinates | nodes_of(first, self.triangles)
+            values[rigid:] = [columns[name] + 1j * columns[f"{name}_imag"] for columns in self.shapes.values()]
+            out[f"shape_{name}"] = ("mode", "node"), values
+        return out if self.triangles is None else out | {"triangles": (("triangle", "corner"), self.triangles)}
 
 
 @dataclass(repr=False)
@@ -286,15 +294,12 @@ class ResponseResult(Rows):
         summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
         rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
             spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
-            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
-            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
-            all outputs; `peak` (1 at frequencies that were added to see a peak).
+            unit) and `tip_u2_phase` (rad, how far it is ahead of a load of phase 0); `peak` (1 at frequencies that were
+            added to see a peak).
         direct: complex amplitudes of the outputs, shape (frequencies, outputs).
-        modal: the same by modes.
     """
 
     direct: npt.NDArray[np.complex128]
-    modal: npt.NDArray[np.complex128]
     index = ("frequency",)
     figure = "results.plots:response_figure"
 
@@ -316,10 +321,6 @@ class ResponseResult(Rows):
         """Return the phase of an output over the frequencies, rad, from −π to π."""
         return np.asarray(np.angle(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
 
-    def texts(self) -> dict[str, str]:
-        """Return response.csv."""
-        return {"response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows))}
-
     def tables(self) -> list[ShortTable]:
         """Return where every output is largest."""
         units, peaks = ShownUnits.of(self.summary), self.summary["peaks"]
@@ -329,9 +330,3 @@ class ResponseResult(Rows):
             for name, peak in peaks.items()
         ]
         return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`."""
-        over, outputs = ("frequency", "output"), np.array(self.outputs, dtype=str)
-        coordinates: Variables = {"frequency": (over[:1], self.frequencies), "output": (over[1:], outputs)}
-        return {"direct": (over, self.direct), "modal": (over, self.modal)}, coordinates

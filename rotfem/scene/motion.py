@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, StrictBool, Tag, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Field, StrictBool, ValidationInfo
 
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.loads import Signal, TimeFunction, function_of
-from rotfem.scene.table import SceneModel, by_type, problem, unit
+from rotfem.scene.table import SceneModel, one_of, problem, unit
 from rotfem.scene.values import (
     Matrix,
     NonNegative,
@@ -185,17 +185,7 @@ for _table in _TABLES:
 BUILT_IN = tuple(table.name for table in _TABLES)
 
 
-def _tag(value: Any) -> str:
-    tag = by_type(value)
-    return tag if tag[1:-1] in BUILT_IN else "<law>"
-
-
-AnyMotion = Annotated[
-    Annotated[ConstantMotion, Tag("<constant>")]
-    | Annotated[SpinUpMotion, Tag("<spin_up>")]
-    | Annotated[TableMotion, Tag("<table>")]
-    | Annotated[TorqueMotion, Tag("<torque>")]
-    | Annotated[CallableMotion, Tag("<callable>")]
-    | Annotated[LawMotion, Tag("<law>")],
-    Discriminator(_tag),
-]
+if TYPE_CHECKING:
+    AnyMotion = ConstantMotion | SpinUpMotion | TableMotion | TorqueMotion | CallableMotion | LawMotion
+else:
+    AnyMotion = Annotated[Any, one_of({table.name: table for table in _TABLES}, LawMotion)]

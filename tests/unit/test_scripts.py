@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -54,26 +53,6 @@ def test_representations_are_short() -> None:
         assert len(repr(thing)) < 500, type(thing)
         assert len(str(thing)) < 500, type(thing)
     assert repr(problem().structure).startswith("PlanarBeamStructure(length=10.0, section=PlanarSection(EA=28000000.0")
-
-
-# --- signatures -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["PlanarBeam", "SpatialBeam", "Plate", "BeamMesh", "PlateMesh"])
-def test_signatures_have_the_keys_and_types_that_a_script_gives(name: str) -> None:
-    table = getattr(rotfem, name)
-    parameters = inspect.signature(table).parameters
-    assert list(parameters) == list(table.model_fields)
-    assert all(p.kind is p.KEYWORD_ONLY for p in parameters.values())
-    assert "Validator" not in str(inspect.signature(table))
-    for key, field in table.model_fields.items():
-        assert (parameters[key].default is inspect.Parameter.empty) == field.is_required()
-
-
-def test_a_key_with_a_unit_may_be_a_text() -> None:
-    parameters = inspect.signature(rotfem.PlanarBeam).parameters
-    assert parameters["length"].annotation == float | str
-    assert inspect.signature(rotfem.BeamMesh).parameters["elements"].annotation is int
 
 
 # --- units ------------------------------------------------------------------------------------------------------------
