@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from textwrap import wrap
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, NoReturn, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rotfem import units
 from rotfem.commands.interrupts import together
@@ -43,9 +43,9 @@ def missing() -> str:
     return absent and f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"
 
 
-def fitted(text: str, stream: TextIO) -> str:
+def folded(text: str, at_terminal: bool) -> str:
     """Return a text with its lines folded to the width of the terminal; as it is where there is none."""
-    if not stream.isatty():
+    if not at_terminal:
         return text
     width = shutil.get_terminal_size().columns
     folds: dict[str, Any] = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
@@ -239,7 +239,7 @@ class Session:
         """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
             self.bar.stop()
-            print(fitted("\n".join(map(printable, lines)), sys.stdout))
+            print(folded("\n".join(map(printable, lines)), sys.stdout.isatty()))
 
 
 class ProgressBar:
@@ -292,11 +292,10 @@ class ProgressBar:
 
     def print(self, line: str) -> None:
         """Print a line, above the bar if there is one."""
-        text = fitted(line, sys.__stderr__ or sys.stderr)  # the bar has another one in its place
         if self._bar is not None:
-            self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._bar.console.print(folded(line, True), markup=False, highlight=False, soft_wrap=True)
         else:
-            print(text, file=sys.stderr, flush=True)
+            print(folded(line, sys.stderr.isatty()), file=sys.stderr, flush=True)
 
     def says(self, line: str) -> None:
         """Print a line that is a kind of progress."""
