@@ -294,15 +294,12 @@ class ResponseResult(Rows):
         summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
         rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
             spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
-            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
-            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
-            all outputs; `peak` (1 at frequencies that were added to see a peak).
+            unit) and `tip_u2_phase` (rad, how far it is ahead of a load of phase 0); `peak` (1 at frequencies that were
+            added to see a peak).
         direct: complex amplitudes of the outputs, shape (frequencies, outputs).
-        modal: the same by modes.
     """
 
     direct: npt.NDArray[np.complex128]
-    modal: npt.NDArray[np.complex128]
     index = ("frequency",)
     figure = "results.plots:response_figure"
 

@@ -79,8 +79,8 @@ def test_distance_of_responses_counts_the_phase() -> None:
 
     def of(name: str, turn: float) -> ResponseResult:
         values = np.exp(1j * turn) * np.ones((5, 1))
-        rows = [{"frequency": float(w), "tip_u2": 1.0, "tip_u2_phase": turn, "tip_u2_modal": 1.0} for w in omega]
-        return ResponseResult(summary("response", name, outputs=["tip_u2"], speed=0.0), rows, values, values)
+        rows = [{"frequency": float(w), "tip_u2": 1.0, "tip_u2_phase": turn} for w in omega]
+        return ResponseResult(summary("response", name, outputs=["tip_u2"], speed=0.0), rows, values)
 
     (row,) = compare(of("a", 0.0), of("b", 0.1)).rows
     assert row["difference"] == pytest.approx(2 * np.sin(0.05))  # |e^{0.1 i} − 1|
