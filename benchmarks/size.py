@@ -106,7 +106,7 @@ def constants(module: str) -> int:
 
 
 def circles(lazy: bool) -> list[list[str]]:
-    """Return circles of imports, for type checkers too, each broken where it was found; if lazy with those in functions."""
+    """Return circles of imports, for type checkers too, each broken where it was found; those in functions if lazy."""
     graph = {module: imported(module, everywhere=lazy) for module in MODULES}
     found: list[list[str]] = []
     while True:
