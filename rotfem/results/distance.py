@@ -96,10 +96,12 @@ class Spectrum:
         values: λ, (modes,), rad/s; 0 of what is zero to round-off.
         shapes: sampled at the same places on every mesh, complex, (modes, samples), nan where one has none; None to
             pair modes by their order.
+        count: number of the first modes that count; the others are there to be paired with. All of them if None.
     """
 
     values: Array
     shapes: Array | None = None
+    count: int | None = None
 
     @property
     def scale(self) -> float:
@@ -111,14 +113,14 @@ class Spectrum:
 
         Of an eigenvalue that is zero it is relative to the smallest other one.
         """
-        own, there = self.values, other.values
+        own, there = self.values[: self.count], other.values
         if len(own) == 0 or len(there) == 0:
             return Distance(0.0 if len(own) == 0 else np.inf)
         off = np.abs(there[None, :] - own[:, None])
         if self.shapes is None or other.shapes is None:
             off = off[:, : len(own)].diagonal() if len(there) >= len(own) else np.full(len(own), np.inf)
         else:
-            alike = alikeness(self.shapes, other.shapes)
+            alike = alikeness(self.shapes[: self.count], other.shapes)
             off = np.where(alike >= 0.9 * alike.max(axis=1, keepdims=True), off, np.inf).min(axis=1)
         each = off / sizes(own)
         return Distance(float(each.max()), each=each)
