@@ -16,7 +16,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
-from rotfem.accuracy.outputs import OUTPUTS, of_columns, output_of
+from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
@@ -114,6 +114,11 @@ class Simulation:
         """Whether the equilibrium is stable; None of a history."""
         known = self.monitor.stability if self.scene.time is None else None
         return None if known is None else known.stable
+
+    @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of the vertices of the mesh along each axis."""
+        return lines(self.system)
 
     @property
     def round_off(self) -> None:
