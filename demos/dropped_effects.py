@@ -57,7 +57,7 @@ def main(figure: Path | None = None) -> float:
         integrals = f"{row['F']}, {row['J']}"
         say(f"{name:<18}{row['error']:>10.1e}{row['time']:>8.3f} s{integrals:>20}")
     off = frequency_error(rotfem.Scene.from_dict(THICK), "coriolis")
-    report("lag 1 of the thick beam without coriolis", off, REFERENCE, "%")
+    report("1st edgewise of the thick beam without coriolis", off, REFERENCE, "%")
     if figure is not None and FIRST_RANK:
         plot(rows, figure)
     return off
