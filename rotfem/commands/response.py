@@ -31,8 +31,8 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.advice import frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, theory_error
-from rotfem.commands.problem import Problem, loads_of
+from rotfem.commands.modes import analysis_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.loads import AnyLoad, Loads, PlaceLoad, Term
@@ -233,7 +233,7 @@ def result_of(
             row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
         rows.append(row | {"peak": int(peak)})
     modes = mode_rows(analysis, spinning)
-    stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     warnings = [
         *frozen_in_frame(analysis.problem),
         *analysis.notes,
@@ -242,14 +242,13 @@ def result_of(
         *doubtful(modes),
     ]
     warnings += [stability.warning()] if not stability.stable else []
-    warnings += [theory.warning()] if theory and theory.warning() else []
     warnings += [no_damping(modes, undamped)] if undamped else []
     if scene.accuracy is not None:
         warnings.append(
             f"accuracy = {scene.accuracy:g} is not pursued: a frequency response is of the scene's own model and mesh"
         )
     summary = {
-        **modal_summary("response", analysis, scene, started, theory),
+        **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,
@@ -283,7 +282,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     Raises:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
-    made = loads_of(scene, motion)
+    made = Loads.of(scene.loads, scene.structure, motion.angle)
     changing = {name: load for name, load in made.named.items() if not load.constant}
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "

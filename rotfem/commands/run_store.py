@@ -25,6 +25,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import SceneError, Stopped
+from rotfem.listeners import computing
 from rotfem.results.checkpoint_file import checkpoint_of, read_checkpoint, write_checkpoint
 from rotfem.results.result_set import CHECKPOINT, LiveTable, ResultFolder
 from rotfem.scene import Scene, Time
@@ -37,7 +38,7 @@ SELDOM = 50
 
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
-    "log": ("steps", "warnings", "resumed"),
+    "log": ("steps", "parts", "warnings", "resumed"),
     "monitor": ("since", "stability"),
     "monitor.farthest": ("seen",),
     "record.snapshots": ("kept", "_every", "_count"),
@@ -84,6 +85,7 @@ class Memory:
             "versions": versions(),
             "t": state.t,
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
+            "cpu": self.log.cpu + computing() - self.log.began,
             "rows": np.array(self.record.history.rows()).reshape(len(self.record.history), -1),
             "processes": self.system.comm.gather(own),
         }
@@ -107,7 +109,7 @@ class Memory:
             vars(part).update(own["parts"][name])
         for row in tree["rows"]:
             self.record.history.append(row)
-        self.log.elapsed = tree["elapsed"]
+        self.log.elapsed, self.log.cpu = tree["elapsed"], tree["cpu"]
         state: State = own["state"]
         self.log.resumed.append({"time": state.t, "ranks": comm.size})
         self.system.count_rotations_from(state.reference)
@@ -124,7 +126,7 @@ def identity_of(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, An
     content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
     tables: Tree = json.loads(json.dumps(scene.digest(), default=str))
     tables.get("time", {}).pop("end", None)
-    tables = {key: value for key, value in tables.items() if key not in ("name", "limits")}
+    tables.pop("name", None)
     return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
 
 

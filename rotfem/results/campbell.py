@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
 from rotfem.results.files import json_text
-from rotfem.results.result import Array, Rows
+from rotfem.results.result import Array, OfTable, Rows
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,13 @@ class CampbellResult(Rows):
     """
 
     index = ("speed", "label")
+    frequencies = OfTable(
+        "frequency",
+        "Frequencies in the rotating frame, (speeds, branches), rad/s; NaN where a branch is lost. With supports that "
+        "differ by direction they are those in the fixed frame.",
+    )
+    damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (speeds, branches); NaN where a branch is lost.")
+    growth = OfTable("growth", "Growth Re λ, (speeds, branches), 1/s; NaN where a branch is lost.")
 
     @property
     def labels(self) -> list[str]:
@@ -81,24 +88,6 @@ class CampbellResult(Rows):
     def refined(self) -> npt.NDArray[np.bool_]:
         """Which of `speeds` were not asked for, shape (speeds,)."""
         return np.array(list(self._refined().values()), dtype=bool)
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost.
-
-        With supports that differ by direction they are those in the fixed frame.
-        """
-        return self.column("frequency")
-
-    @property
-    def damping(self) -> Array:
-        """Damping ratios −Re λ/|λ|, shape (speeds, branches); NaN where a branch is lost."""
-        return self.column("damping")
-
-    @property
-    def growth(self) -> Array:
-        """Growth Re λ, shape (speeds, branches), 1/s; NaN where a branch is lost."""
-        return self.column("growth")
 
     @property
     def critical_speeds(self) -> list[CriticalSpeed]:

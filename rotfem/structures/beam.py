@@ -66,7 +66,7 @@ class Beam(Structure):
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.masses = getattr(self.data, "masses", ())
         supported = getattr(self.data, "supports", ())
-        points = [*(point.x for point in self.point_loads), *((at.x,) for at in (*self.masses, *supported))]
+        points = [*problem.loads.places, *((at.x,) for at in (*self.masses, *supported))]
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))

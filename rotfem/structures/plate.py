@@ -37,7 +37,7 @@ from rotfem.structures.structure import Array, PointValues, Structure, check_mem
 def plate_points(plate: Structure) -> Points:
     """Return the points of masses and loads of a plate."""
     masses = [row[:2] for row in plate.data.point_masses]
-    applied = [point.x for point in plate.point_loads]
+    applied = list(plate.problem.loads.places)
     points = Points(plate.mesh, [*masses, *applied])
     missing = points.missing
     if missing is None:

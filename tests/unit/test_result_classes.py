@@ -148,7 +148,7 @@ def test_a_run_by_its_names() -> None:
     assert result.figures == FIGURES
     assert not result.steady
     assert history(kind="steady").steady
-    with pytest.raises(KeyError, match="no number 'tip_u3' in history; there are t, psi, psi_dot, tip_u1"):
+    with pytest.raises(KeyError, match="no number 'tip_u3' in the table; there are t, psi, psi_dot, tip_u1"):
         result.column("tip_u3")
 
 
@@ -164,7 +164,7 @@ def test_modes_by_their_names() -> None:
     np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
     assert result.stable
     assert not modes("dynamic instability").stable
-    with pytest.raises(KeyError, match="no number 'label' in modes; there are mode, frequency"):
+    with pytest.raises(KeyError, match="no number 'label' in the table; there are mode, frequency"):
         result.column("label")
 
 

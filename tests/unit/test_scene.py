@@ -15,10 +15,8 @@ import tomli_w
 from pydantic import ValidationError
 
 import rotfem
-from rotfem.commands.problem import loads_of, motion_of
+from rotfem.commands.problem import motion_of
 from rotfem.errors import ComputationError, Problem, SceneError
-from rotfem.mechanics.loads import Loads
-from rotfem.mechanics.motion import Motion
 from rotfem.scene import (
     BeamMesh,
     PlanarBeamStructure,
@@ -158,28 +156,21 @@ def test_tip_inertia_of_a_spatial_beam() -> None:
     np.testing.assert_array_equal(full.tip_inertia_matrix, [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]])
 
 
-def loads_of_scene(s: Scene) -> Loads:
-    """Return the loads of a scene at rest as sums of shapes times amplitudes."""
-    return loads_of(s, Motion.constant_speed(0.0))
-
-
 def test_loads_in_all_their_forms() -> None:
-    bare = loads_of_scene(scene(loads__tip_force=[1, 2])).tip_force
-    assert bare is not None
+    def made(kind: str = "planar", /, **loads: Any) -> Any:
+        """Return the loads of a scene as sums of shapes times amplitudes, by name."""
+        return rotfem.Problem.of(scene(kind, loads=loads)).loads.named
+
+    bare = made(tip_force=[1, 2])["tip_force"]
     np.testing.assert_array_equal(bare.at(7.0), [1, 2, 0])
     assert (bare.kind, bare.constant, bare.is_zero) == ("dead", True, False)
-    table = loads_of_scene(scene(loads__distributed={"table": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})).distributed
-    assert table is not None
+    table = made(distributed={"table": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})["distributed"]
     np.testing.assert_allclose([table.at(t) for t in (-1, 0.5, 9)], [[0, 0, 0], [1, 2, 0], [4, 8, 0]])
     assert (table.kind, table.constant) == ("follower", False)
-    moment = loads_of_scene(scene(loads__tip_moment=5)).tip_moment
-    assert moment is not None
-    np.testing.assert_array_equal(moment.at(0.0), [5.0])
-    spatial = loads_of_scene(scene("spatial", loads__distributed_moment={"value": [1, 2, 3]})).distributed_moment
-    assert spatial is not None
+    np.testing.assert_array_equal(made(tip_moment=5)["tip_moment"].at(0.0), [5.0])
+    spatial = made("spatial", distributed_moment={"value": [1, 2, 3]})["distributed_moment"]
     np.testing.assert_array_equal(spatial.at(0.0), [1, 2, 3])
-    zero = loads_of_scene(scene(loads__tip_force=[[0, 0, 0], [1, 0, 0]])).tip_force
-    assert zero is not None
+    zero = made(tip_force=[[0, 0, 0], [1, 0, 0]])["tip_force"]
     assert zero.is_zero
     assert zero.constant
 

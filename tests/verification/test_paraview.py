@@ -122,8 +122,3 @@ def test_plates_write_xdmf_too(tmp_path: Path) -> None:
     assert times == [1.0, 2.0]
     np.testing.assert_allclose(mesh.points[:, 1], columns["y"], atol=1e-7)
     np.testing.assert_allclose(mesh["displacement"][:, 2], columns["u3"], atol=1e-7)
-
-
-def test_formats_that_are_none_are_refused() -> None:
-    with pytest.raises(rotfem.SceneError, match="output.fields"):
-        rotfem.Scene.from_dict({**SPIN_UP, "output": {"fields": ["stl"]}})
