@@ -25,7 +25,6 @@ class CriticalSpeed:
         per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
         frequency: of the branch there, in the rotating frame, kΩ, rad/s.
         label: of the branch.
-        name: what an engineer calls it, as "1st flapwise".
     """
 
     speed: float
@@ -35,7 +34,6 @@ class CriticalSpeed:
     per_rev: int
     frequency: float
     label: str
-    name: str
 
 
 @dataclass(frozen=True)
@@ -137,7 +135,7 @@ class CampbellResult(Rows):
 
         columns = [
             [str(b["branch"]) for b in branches],
-            [b["name"] for b in branches],
+            [b["label"] for b in branches],
             frequencies("frequency_first"),
             frequencies("frequency_last"),
             [f"{b['confidence']:.3f}" for b in branches],
@@ -146,7 +144,7 @@ class CampbellResult(Rows):
         head = ("branch", "name", first, last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
-            what = f"{c.name} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.name}, synchronous"
+            what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"
             critical.append((number(float(units.speeds(c.speed)), digits=8), what))
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:

@@ -242,7 +242,7 @@ class ModesResult(Rows):
         errors = [e if row["stability"] != "unresolved" else None for e, row in zip(errors, rows, strict=True)]
         columns = [
             [str(row["mode"]) for row in rows],
-            [row["name"] for row in rows],
+            [row["label"] for row in rows],
             numbers([float(in_unit(row["frequency"], first)) for row in rows], 8),
             numbers([row["frequency_hz"] for row in rows], 8),
             [per_cent(row["damping"]) for row in rows],

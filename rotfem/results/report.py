@@ -373,7 +373,7 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         v = np.stack([columns.get(f"u{i}_imag", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         scale = AMPLITUDE * length / max(float(np.max(np.hypot(u, v))), 1e-300)
         moves.append([np.round(scale * part, 5).tolist() for part in (u, v)])
-        said = f"{row.get('name', row['label'])}, {frequency}"
+        said = f"{row['label']}, {frequency}"
         cards += f"<figure><canvas></canvas><figcaption>{row['mode']}: {escape(said)}</figcaption></figure>"
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     extent = float(np.linalg.norm(high - low))
