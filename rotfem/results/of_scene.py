@@ -62,10 +62,10 @@ class CheckResult(Result):
         """Inertia tensor about the clamp, kg·m², shape (3, 3)."""
         return np.array(self.summary["inertia_root"])
 
-    def data(self) -> dict[str, Columns]:
-        """Return the properties along a beam over `x`; of a plate the coordinates of its nodes."""
-        of_beam = Columns(self.columns, ("x",))
-        return {"check": of_beam if self.columns else Columns(self.nodes, dimension="node")}
+    @property
+    def table(self) -> Columns:
+        """Properties along a beam over `x`; of a plate the coordinates of its nodes."""
+        return Columns(self.columns, ("x",)) if self.columns else Columns(self.nodes, dimension="node")
 
     def tables(self) -> list[ShortTable]:
         """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
