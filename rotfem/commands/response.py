@@ -32,7 +32,7 @@ from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.advice import frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of
-from rotfem.commands.problem import Problem, loads_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.loads import AnyLoad, Loads, PlaceLoad, Term
@@ -282,7 +282,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     Raises:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
-    made = loads_of(scene, motion)
+    made = Loads.of(scene.loads, scene.structure, motion.angle)
     changing = {name: load for name, load in made.named.items() if not load.constant}
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "

@@ -54,21 +54,11 @@ def form_of(code: Any, module: Any, spaces: list[Any], functions: list[Any], con
     return fem.Form(made, code, None, module)
 
 
-def _gmshio() -> Any:
+def model_to_mesh(model: Any, comm: Any) -> tuple[Any, Any, Any]:
+    """Return (mesh in the plane, cell tags, edge tags) of a gmsh model that rank 0 holds."""
     try:
         from dolfinx.io import gmsh as gmshio
     except ImportError:
         from dolfinx.io import gmshio
-    return gmshio
-
-
-def extract(model: Any) -> None:
-    """Do once what `model_to_mesh` does on rank 0 alone, to see it fail there where no other rank waits for it."""
-    _gmshio().extract_geometry(model)
-    _gmshio().extract_topology_and_markers(model)
-
-
-def model_to_mesh(model: Any, comm: Any) -> tuple[Any, Any, Any]:
-    """Return (mesh in the plane, cell tags, edge tags) of a gmsh model that rank 0 holds."""
-    out = _gmshio().model_to_mesh(model, comm, 0, gdim=2)
+    out = gmshio.model_to_mesh(model, comm, 0, gdim=2)
     return (out.mesh, out.cell_tags, out.facet_tags) if hasattr(out, "mesh") else out[:3]

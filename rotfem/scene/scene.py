@@ -327,7 +327,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS.padded}
+    vectors |= {f"loads.{name}": load for name, load, _ in loads.named() if load.VECTORS.padded}
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
             value = list(signal.value) if signal.value is not None else None
