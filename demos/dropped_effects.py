@@ -56,7 +56,7 @@ def main(figure: Path | None = None) -> float:
     for name, row in rows.items():
         say(f"{name:<18}{row['error']:>10.1e}{row['time']:>8.3f} s")
     off = frequency_error(rotfem.Scene.from_dict(THICK), "coriolis")
-    report("lag 1 of the thick beam without coriolis", off, REFERENCE, "%")
+    report("1st edgewise of the thick beam without coriolis", off, REFERENCE, "%")
     if figure is not None and FIRST_RANK:
         plot(rows, figure)
     return off

@@ -38,7 +38,7 @@ from rotfem.results import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST
-from rotfem.structures.mode_names import distinct, engineers_name
+from rotfem.structures.mode_names import distinct
 from rotfem.units import speed_text, split_unit
 from rotfem.version import __version__
 
@@ -197,8 +197,7 @@ def diagram(
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
     for crossing in crossings:
-        label = labels[crossing["branch"] - 1]
-        crossing |= {"label": label, "name": engineers_name(label)}
+        crossing["label"] = labels[crossing["branch"] - 1]
     last = sweep.points[-1].spinning.first(count)
     of_last = {} if mesh is None else dict(zip(sweep.points[-1].order, mesh, strict=False))
     known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
@@ -216,7 +215,6 @@ def diagram(
             {
                 "branch": b + 1,
                 "label": labels[b],
-                "name": engineers_name(labels[b]),
                 "confidence": min(float(point.confidence[b]) for point in sweep.points),
                 "frequency_first": _finite(sweep.points[0].value(b).imag),
                 "frequency_last": _finite(sweep.points[-1].value(b).imag),

@@ -159,12 +159,7 @@ class Session:
             raise SceneError("command line", option, str(path), reason)
 
     def start(self, title: str, unit: str = "rad/s") -> None:
-        """Begin to show progress.
-
-        Args:
-            title: of the computation.
-            unit: of speeds in messages.
-        """
+        """Begin to show progress; messages have speeds in the unit, too."""
         units.SPEED.set(unit)
         self.bar = ProgressBar(title, self.first and not self.quiet and not self.as_json)
         self.bar.start()
@@ -179,15 +174,7 @@ class Session:
         return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
 
     def finish(self, result: Result, plots: bool, further: Sequence[Writer] = (), last: bool = True) -> None:
-        """Write a result, its figures and what else is wanted; print its summary if --json asks, or its report.
-
-        Of a computation that has failed nothing but warnings is reported. If it is not the last word, the error is
-        still to come (see `complete`).
-
-        Raises:
-            OutputError: a file cannot be written; those that can are.
-            SceneError: something further cannot be made.
-        """
+        """Write a result, its figures and what else is wanted; print it unless it failed. The last one is complete."""
         from rotfem.commands.printed import report
 
         assert self._folder is not None
@@ -203,12 +190,7 @@ class Session:
             self.say([*report(result), f"results in {self._folder.path}"])
 
     def complete(self, result: Result, further: Sequence[Writer] = ()) -> None:
-        """Write the summary of a result again, now with its error, and what else is wanted; print the error.
-
-        Raises:
-            OutputError: a file cannot be written.
-            SceneError: something further cannot be made.
-        """
+        """Write the summary of a result again, now with its error, and what else is wanted; print the error."""
         from rotfem.commands.printed import of_error
 
         assert self._folder is not None

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.results import ModesResult
-from rotfem.structures.mode_names import Wave, distinct, engineers_name
+from rotfem.structures.mode_names import Wave, distinct
 from rotfem.units import speed_text
 
 Array = npt.NDArray[Any]
@@ -52,8 +52,7 @@ def mode_tables(
     if rigid:  # hub and structure turn together, λ = 0
         columns = rows[0] if rows else mode_rows(analysis, found.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
-        named = dict.fromkeys(("label", "name"), "rigid body")
-        rows = [{**first, "mode": 1, **named, "stability": "neutral", "share_hub": 1.0}, *rows]
+        rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
     structure = analysis.structure
     summary = {
         **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
@@ -85,7 +84,6 @@ def mode_rows(
             {
                 "mode": i + 1,
                 "label": names[i],
-                "name": engineers_name(names[i]),
                 "frequency": float(lam.imag),
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
                 "damping": float(-lam.real / size) if size > 0.0 else 0.0,

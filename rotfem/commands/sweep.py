@@ -34,7 +34,7 @@ from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
 from rotfem.listeners import Progress
 from rotfem.results.files import write_text
-from rotfem.results.result_set import read_summary
+from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
 from rotfem.scene import load_scene
 from rotfem.scene.extensions import load, loaded
@@ -187,28 +187,30 @@ def sweep(
     rows = {p.folder: p.row() for p in points if p.settled}
     swept = {key: list(values) for key, values in keys.items() if len(values) > 1}
     fixed = {key: values[0] for key, values in keys.items() if key not in swept}
-    of_all = {"command": "sweep", "status": "done", "name": scene.stem, "verb": list(verb)}
+    of_all: dict[str, Any] = {"command": "sweep", "status": "done", "name": scene.stem, "verb": list(verb)}
+    of_all |= {"keys": swept, "fixed": fixed}
 
     def result() -> SweepResult:
-        found = [{k: v for k, v in rows[p.folder].items() if k not in fixed} for p in points if p.folder in rows]
-        reasons = [row["reason"] for row in found if row["status"] != "done"]
+        those = [{k: v for k, v in rows[p.folder].items() if k not in fixed} for p in points if p.folder in rows]
+        reasons = [row["reason"] for row in those if row["status"] != "done"]
         warnings = [f"{len(reasons)} of {len(points)} points failed, the first one: {reasons[0]}"] if reasons else []
-        counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in found)}
-        return SweepResult(
-            {**of_all, "keys": swept, "fixed": fixed, **counts, "warnings": warnings, "versions": versions()}, found
-        )
+        counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in those)}
+        return SweepResult({**of_all, **counts, "warnings": warnings, "versions": versions()}, those)
 
-    try:
-        for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
-            rows[point.folder] = row
-            write_text(folder / "sweep.csv", result().texts()["sweep.csv"])
-            if progress is not None:
-                progress(len(rows) / len(points))
-    except OutputError as error:
-        problem = error
-    raise_first(comm.allgather(problem))
-    done: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
-    return done
+    with ResultFolder(comm, folder, "sweep", [scene]) as results:
+        results.begin()
+        try:
+            for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
+                rows[point.folder] = row
+                write_text(folder / "sweep.csv", result().texts()["sweep.csv"])
+                if progress is not None:
+                    progress(len(rows) / len(points))
+        except OutputError as error:
+            problem = error
+        raise_first(comm.allgather(problem))
+        found: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
+        results.publish(found)
+        return found
 
 
 def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str], jobs: int, comm: MPI.Comm) -> None:

@@ -216,7 +216,7 @@ def shapes_figure(result: ModesResult) -> Figure:
                 drawn[name] = panel.plot(x, real, lw=1.4, color=f"C{c}", label=what)[0]
             if np.max(np.abs(imaginary)) > VISIBLE:
                 panel.plot(x, imaginary, lw=1.0, ls="--", color=f"C{c}")
-        caption(panel, f"{row['mode']}  {row['name']}, {frequency}")
+        caption(panel, f"{row['mode']}  {row['label']}, {frequency}")
         panel.set_xlim(x[0], x[-1])
         panel.set_ylabel("shape (–)")
     handles = [drawn[name] for name in names if name in drawn]
@@ -353,6 +353,6 @@ def plate_modes_figure(result: ModesResult) -> Figure:
         name = f"u{1 + int(np.argmax(np.max(size, axis=1)))}"
         drawn = draw(axis, mesh, columns[name], clamped)
         drawn.set(cmap="RdBu_r", norm=Normalize(-1.0, 1.0))
-        axis.set_title(f"{row['mode']}  {row['name']}, {described(name)[0]}\n{frequency}", fontsize=9)
+        axis.set_title(f"{row['mode']}  {row['label']}, {described(name)[0]}\n{frequency}", fontsize=9)
     add_bar(figure, drawn, axes, "displacement (–)")
     return figure

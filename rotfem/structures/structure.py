@@ -21,7 +21,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
 from rotfem.structures.applied_loads import Loaded
-from rotfem.structures.mode_names import Wave
+from rotfem.structures.mode_names import ModeName, Wave
 from rotfem.structures.points import locate
 from rotfem.structures.reference_rotation import Turns
 
@@ -332,8 +332,8 @@ class Structure(Loaded):
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
 
-    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
-        """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
+        """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:

@@ -50,8 +50,8 @@ def diagram(frequencies: dict[str, float], damping: float = 0.0, **more: Any) ->
         for k in more.get("orders", [1, 2, 3, 4]):
             if k**2 > 1.3 and (speed := at_rest / np.sqrt(k**2 - 1.3)) < SPEEDS[-1]:
                 place = {"speed": speed, "kind": "per_rev", "order": k, "per_rev": k, "frequency": k * speed}
-                crossings.append({**place, "branch": branch, "label": name, "name": name})
-    branches = [{"branch": i, "label": name, "name": name} for i, name in enumerate(frequencies, start=1)]
+                crossings.append({**place, "branch": branch, "label": name})
+    branches = [{"branch": i, "label": name} for i, name in enumerate(frequencies, start=1)]
     found = {"critical_speeds": crossings, "instabilities": [], "ambiguous": [], "orders": [1, 2, 3, 4]}
     units = {"scene": {"output": {"speed": "rpm", "frequency": "Hz"}}}
     rows.sort(key=lambda row: row["speed"])
@@ -89,7 +89,7 @@ def test_the_limit_follows_the_modes_that_lines_meet() -> None:
 def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
     result = diagram({"1st forward whirl": 1.0}, 0.02)
     place = {"speed": 0.9, "kind": "forward", "order": 1, "per_rev": 0, "frequency": 0.0, "branch": 1}
-    result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl", "name": "1st forward whirl"}]
+    result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl"}]
     frequency, damping = campbell_figure(result).axes
     lines = [line for line in frequency.get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
     assert np.min(lines[0].get_ydata()) == 0.0
@@ -184,8 +184,8 @@ def test_modes_of_a_beam() -> None:
     shapes, rows = {}, []
     for i in range(1, 7):
         columns = {"x": x, "u1": 0 * x, "u2": np.sin(i * x), "u3": 0.3 * x, "theta1": 0.1 * x, "theta2": 5 * x}
-        shapes[f"mode {i}: flap {i}"] = columns | {f"{n}_imag": 0.01 * v for n, v in columns.items() if n != "x"}
-        rows.append({"mode": i, "label": f"flap {i}", "name": f"{i}th flapwise", "frequency": 3.0 * i})
+        shapes[f"mode {i}: {i}th flapwise"] = columns | {f"{n}_imag": 0.01 * v for n, v in columns.items() if n != "x"}
+        rows.append({"mode": i, "label": f"{i}th flapwise", "frequency": 3.0 * i})
     figure = ModesResult(said(speed=1.0), rows, shapes).plot()
     check(figure)
     assert titles(figure)[1] == "2  2th flapwise, 6 rad/s"
@@ -250,8 +250,8 @@ def test_modes_of_a_plate(count: int, aspect: float) -> None:
     shapes, rows = {}, []
     for i in range(1, count + 1):
         w = np.sin(i * np.pi * x / 2) * (y - 0.5 * aspect) / aspect
-        shapes[f"mode {i}: torsion {i}"] = columns | {"u1": 0 * x, "u2": 0 * x, "u3": 2 * w}
-        rows.append({"mode": i, "label": f"torsion {i}", "name": f"{i}th torsion", "frequency": 3.0 * i})
+        shapes[f"mode {i}: {i}th torsion"] = columns | {"u1": 0 * x, "u2": 0 * x, "u3": 2 * w}
+        rows.append({"mode": i, "label": f"{i}th torsion", "frequency": 3.0 * i})
     result = ModesResult(said(speed=1.0), rows, shapes)
     result.triangles = triangles
     figure = result.plot()

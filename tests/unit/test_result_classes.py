@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 import xarray
 
-from rotfem.commands.cost.result import CostResult
 from rotfem.errors import OutputError
-from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
+from rotfem.results import CampbellResult, CriticalSpeed, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import SHORT, Columns, ShortTable, described, label, numbers
-from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])
 X = np.array([0.0, 2.0, 4.0])
@@ -52,10 +50,10 @@ def modes(stability: str = "stable") -> ModesResult:
     """Return a rigid-body mode and two others, at 6 rad/s."""
     rows = [
         mode(1, "rigid body", 0.0, 0.0, stability="neutral", share_hub=1.0),
-        mode(2, "lag 1", 4.0, -3.0, stability="stable", share_hub=0.1),
-        mode(3, "lag 2", 12.0, 0.5, stability=stability, share_hub=0.2),
+        mode(2, "1st edgewise", 4.0, -3.0, stability="stable", share_hub=0.1),
+        mode(3, "2nd edgewise", 12.0, 0.5, stability=stability, share_hub=0.2),
     ]
-    shapes = {"mode 2: lag 1": shape(1.0), "mode 3: lag 2": shape(1j)}
+    shapes = {"mode 2: 1st edgewise": shape(1.0), "mode 3: 2nd edgewise": shape(1j)}
     return ModesResult(summary(command="modes", speed=6.0), rows, shapes)
 
 
@@ -64,8 +62,8 @@ def plate_modes() -> ModesResult:
     columns = {"x": np.array([0.0, 1.0, 0.0]), "y": np.array([0.0, 0.0, 1.0])}
     for name in ("u1", "u2", "u3"):
         columns |= {name: np.array([0.0, 0.0, float(name == "u3")]), f"{name}_imag": np.zeros(3)}
-    rows = [mode(1, "flap 1", 2.0, 0.0, stability="stable", turning=0.0)]
-    result = ModesResult(summary(command="modes", speed=0.0), rows, {"mode 1: flap 1": columns})
+    rows = [mode(1, "1st flapwise", 2.0, 0.0, stability="stable", turning=0.0)]
+    result = ModesResult(summary(command="modes", speed=0.0), rows, {"mode 1: 1st flapwise": columns})
     result.triangles = np.array([[0, 1, 2]])
     return result
 
@@ -76,62 +74,22 @@ def campbell() -> CampbellResult:
         {"speed": speed, "branch": branch, "label": name, "mode": name, "frequency": branch * (3.0 + speed)}
         | {"growth": 0.0, "damping": 0.0, "confidence": 1.0, "refined": int(speed == 5.0)}
         for speed in (0.0, 5.0, 10.0)
-        for branch, name in ((1, "lag 1"), (2, "axial 1"))
+        for branch, name in ((1, "1st edgewise"), (2, "1st axial"))
         if (speed, branch) != (10.0, 2)
     ]
     ends = {"confidence": 1.0, "frequency_first": 3.0, "frequency_last": 13.0}
-    branches = [{"branch": 1, "label": "lag 1", "name": "lag 1", **ends}]
-    branches.append({**ends, "branch": 2, "label": "axial 1", "name": "axial 1", "frequency_last": None})
+    branches = [{"branch": 1, "label": "1st edgewise", **ends}]
+    branches.append({**ends, "branch": 2, "label": "1st axial", "frequency_last": None})
     meets = {"speed": 3.0, "kind": "per_rev", "order": 2, "branch": 1, "per_rev": 2, "frequency": 6.0}
     said = summary(
         **{"command": "campbell", "branches": branches, "per_rev": 2, "orders": [1, 2], "ambiguous": []},
-        critical_speeds=[{**meets, "label": "lag 1", "name": "lag 1"}],
+        critical_speeds=[{**meets, "label": "1st edgewise"}],
         instabilities=[{"speed": 8.0, "kind": "dynamic instability", "until": None}],
     )
     return CampbellResult(said, rows)
 
 
-def explained() -> ExplainResult:
-    """Return an effect and a theory; the theory fails for one output, and its truth was not computed."""
-    rows = [
-        {"kind": "effect", "name": "coriolis", "included": True, "why": "the structure spins", "verdict": "noticeable"}
-        | {"estimate": {"steady": 0.0, "modes": 0.02}, "worst": 0.02, "truth": {"steady": 0.0, "modes": 0.021}},
-        {"kind": "theory", "name": "linear", "included": False, "why": "not good enough", "verdict": "large"}
-        | {"estimate": {"steady": np.inf, "modes": 0.5}, "worst": np.inf},
-    ]
-    return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}, resolution=1e-4), rows)
-
-
-def cost() -> CostResult:
-    """Return a study of four settings: two on the front, one beaten, one failed."""
-    setting = {"theory": "reissner", "elements": [4, 2], "degree": 2, "scheme": "newmark", "tolerance": None}
-    rows = [
-        {**setting, "step": step, "status": "failed" if error is None else "done", "error": error, "reason": ""}
-        | {"total_error": error, "time": time, "cost": time, "pareto": pareto}
-        for step, time, error, pareto in (
-            (0.01, 4.0, 1e-5, True),
-            (0.02, 2.0, 1e-3, True),
-            (0.03, 3.0, 1e-2, False),
-            (0.1, 1.0, None, False),
-        )
-    ]
-    said = summary(command="cost", output="tip", accuracy=1e-4, uncertainty=1e-6, recommended=rows[0])
-    del said["theory"]  # a study is of several
-    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": []}
-    section = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
-    structure = {"type": "planar_beam", "length": 1.0, "section": section}
-    scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
-    return CostResult(said, rows, scene)
-
-
-MAKERS = {
-    "run": history,
-    "modes": modes,
-    "plate": plate_modes,
-    "campbell": campbell,
-    "explain": explained,
-    "cost": cost,
-}
+MAKERS = {"run": history, "modes": modes, "plate": plate_modes, "campbell": campbell}
 ALL = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 
 
@@ -148,13 +106,13 @@ def test_a_run_by_its_names() -> None:
     assert result.figures == FIGURES
     assert not result.steady
     assert history(kind="steady").steady
-    with pytest.raises(KeyError, match="no number 'tip_u3' in history; there are t, psi, psi_dot, tip_u1"):
+    with pytest.raises(KeyError, match="no number 'tip_u3' in the table; there are t, psi, psi_dot, tip_u1"):
         result.column("tip_u3")
 
 
 def test_modes_by_their_names() -> None:
     result = modes()
-    assert result.labels == ["rigid body", "lag 1", "lag 2"]
+    assert result.labels == ["rigid body", "1st edgewise", "2nd edgewise"]
     assert result.speed == 6.0
     np.testing.assert_array_equal(result.frequencies, [0.0, 4.0, 12.0])
     np.testing.assert_allclose(2 * np.pi * result.frequencies_hz, result.frequencies)
@@ -164,7 +122,7 @@ def test_modes_by_their_names() -> None:
     np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
     assert result.stable
     assert not modes("dynamic instability").stable
-    with pytest.raises(KeyError, match="no number 'label' in modes; there are mode, frequency"):
+    with pytest.raises(KeyError, match="no number 'label' in the table; there are mode, frequency"):
         result.column("label")
 
 
@@ -172,20 +130,12 @@ def test_branches_over_speed() -> None:
     result = campbell()
     np.testing.assert_array_equal(result.speeds, [0.0, 5.0, 10.0])
     np.testing.assert_array_equal(result.refined, [False, True, False])
-    assert result.labels == ["lag 1", "axial 1"]
+    assert result.labels == ["1st edgewise", "1st axial"]
     np.testing.assert_array_equal(result.frequencies, [[3.0, 6.0], [8.0, 16.0], [13.0, np.nan]])
     assert result.growth.shape == result.damping.shape == (3, 2)
-    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "lag 1", "lag 1")]
+    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "1st edgewise")]
     assert result.instabilities == [Instability(8.0, "dynamic instability", None)]
-    np.testing.assert_array_equal(result.branches()["axial 1"]["frequency"], [6.0, 16.0])
-
-
-def test_changes_of_effects_and_front_of_a_study() -> None:
-    result = explained()
-    assert result.effects["coriolis"]["worst"] == 0.02
-    assert list(result.theories) == ["linear"]
-    assert result.verdicts == {"coriolis": "noticeable", "linear": "large"}
-    assert [row["step"] for row in cost().front] == [0.02, 0.01]
+    np.testing.assert_array_equal(result.branches()["1st axial"]["frequency"], [6.0, 16.0])
 
 
 # --- columns: CSV, tables, labelled arrays ----------------------------------------------------------------------------
@@ -208,14 +158,10 @@ def test_tables_of_pandas() -> None:
     run = history().to_pandas()
     assert run.index.name == "t"
     assert run.loc[0.5, "tip_u1"] == -0.25
-    assert modes().to_pandas().loc[3, "label"] == "lag 2"
+    assert modes().to_pandas().loc[3, "label"] == "2nd edgewise"
     table = campbell().to_pandas()
-    assert table.loc[(5.0, "axial 1"), "frequency"] == 16.0
-    assert list(table["frequency"].unstack("label")["lag 1"]) == [3.0, 8.0, 13.0]
-    rows = explained().to_pandas()
-    assert rows.loc["coriolis", "truth_modes"] == 0.021
-    assert np.isnan(rows.loc["linear", "truth_modes"])
-    assert np.isnan(cost().to_pandas()["error"][3])
+    assert table.loc[(5.0, "1st axial"), "frequency"] == 16.0
+    assert list(table["frequency"].unstack("label")["1st edgewise"]) == [3.0, 8.0, 13.0]
 
 
 def test_labelled_arrays(tmp_path: Path) -> None:
@@ -233,16 +179,14 @@ def test_labelled_arrays(tmp_path: Path) -> None:
         "rad/s",
         6,
     )
-    assert list(shapes["label"].values) == ["rigid body", "lag 1", "lag 2"]
+    assert list(shapes["label"].values) == ["rigid body", "1st edgewise", "2nd edgewise"]
     np.testing.assert_array_equal(plate_modes().to_xarray()["triangles"].values, [[0, 1, 2]])
     branches = campbell().to_xarray()
-    assert float(branches["frequency"].sel(speed=5.0, label="axial 1")) == 16.0
-    assert np.isnan(branches["frequency"].sel(speed=10.0, label="axial 1"))
-    study = cost().to_xarray()
-    assert study["time"].attrs["units"] == "s"
-    study.to_netcdf(tmp_path / "cost.nc")
-    with xarray.open_dataset(tmp_path / "cost.nc") as again:
-        np.testing.assert_array_equal(again["error"].values, study["error"].values)
+    assert float(branches["frequency"].sel(speed=5.0, label="1st axial")) == 16.0
+    assert np.isnan(branches["frequency"].sel(speed=10.0, label="1st axial"))
+    branches.to_netcdf(tmp_path / "campbell.nc")
+    with xarray.open_dataset(tmp_path / "campbell.nc") as again:
+        np.testing.assert_array_equal(again["frequency"].values, branches["frequency"].values)
 
 
 def test_names_and_units_of_columns() -> None:
