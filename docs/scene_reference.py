@@ -8,9 +8,10 @@ from __future__ import annotations
 import inspect
 import itertools
 import json
+import math
 import re
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any
@@ -18,12 +19,12 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from rotfem import registry
-from rotfem.scene import beams, loads, motion, plates, root, section, settings, signals
+from rotfem.scene import beams, loads, motion, plates, root, section, settings
 from rotfem.scene.extensions import Extensions
 from rotfem.scene.scene import Scene
 from rotfem.scene.structure import Damping
 from rotfem.scene.table import SceneModel
-from rotfem.scene.values import Bounds, Limits, parameters_of
+from rotfem.scene.values import padded, parameters_of
 
 PAGE = Path(__file__).with_name("scene-reference.md")
 
@@ -32,8 +33,9 @@ HEAD = """# Scene keys
 All tables of a scene with their keys. `docs/scene_reference.py` writes this page from the tables of the program. What
 goes beyond one key is in [scene.md](scene.md).
 
-A default of – is none. A *profile* is a number, or rows `[[x, value], …]`. Where a number has a unit, a text may give
-another one: `"12.1 rpm"`. A table that is a kind of another one has its keys too. A test checks every example.
+A default of – is none. Rows are `[[x, value], …]` over the span or `[[t, value], …]` over time, or the path of a CSV
+file of them. Where a number has a unit, a text may give another one: `"12.1 rpm"`. A table that is a kind of another
+one has its keys too. A test checks every example.
 """
 
 #: Heading, table, example and the structure that the example is about.
@@ -138,7 +140,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ("`[[loads.at]]`", loads.PointLoad, "toml\n[[loads.at]]\nx = 4.0\nforce = [0, 20]"),
     (
         "`harmonic` of a load",
-        signals.Harmonic,
+        loads.Harmonic,
         "toml\n[loads]\ntip_force = { harmonic = { amplitude = [0, 1], frequency = '1 Hz' } }",
     ),
     ("`[mesh]` of a beam", settings.BeamMesh, "toml\n[mesh]\nelements = 8\ndegree = 3"),
@@ -151,7 +153,6 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
         settings.OutputTable,
         "toml\n[output]\nstations = [0, 2.5, 5]\nquantities = ['M', 'N']\nspeed = 'rpm'\nfrequency = 'Hz'",
     ),
-    ("`[limits]`", Limits, "toml\n[limits]\nsteps = 100_000_000"),
     ("`[extensions]`", Extensions, ""),
 )
 
@@ -169,36 +170,39 @@ def described(table: type) -> dict[str, str]:
     return out
 
 
-def kind(annotation: Any, metadata: list[Any]) -> str:
+def kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     """Return in words what a value may be."""
     if typing.get_origin(annotation) is typing.Annotated:
-        annotation, *metadata = typing.get_args(annotation)
-    check = next((getattr(m, "func", None) for m in metadata if getattr(m, "func", None)), None)
-    bounds = getattr(check, "__self__", None)
-    if isinstance(bounds, Bounds):
-        signs = {">": bounds.gt, "≥": bounds.ge, "<": bounds.lt, "≤": bounds.le}
-        limits = ", ".join(
-            f"{sign} {bound:g}".replace("e-0", "e-").replace("e+0", "e")
-            for sign, bound in signs.items()
-            if bound is not None
-        )
-        return f"{check.__name__} {limits}".strip().replace("e-0", "e-").replace("e+0", "e")
-    of_check = {"as_number": "number", "as_vector3": "3 numbers", "as_padded_vector3": "2 or 3 numbers"}
-    if getattr(check, "__name__", "") in of_check:
-        return of_check[check.__name__]
+        annotation, *more = typing.get_args(annotation)
+        return kind(annotation, [*more, *metadata])
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation in (float, int):
+        bounds = [each for m in metadata for each in getattr(m, "metadata", [m])]
+        signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+        said = [
+            f"{sign} {getattr(b, name):g}".replace("e-0", "e-")
+            for b in bounds
+            for name, sign in signs.items()
+            if abs(getattr(b, name, math.inf)) < 1e9
+        ]
+        return f"{'number' if annotation is float else 'integer'} {', '.join(said)}".strip()
     if origin is typing.Literal:
         return ", ".join(f'`"{name}"`' for name in arguments)
-    if origin is tuple and isinstance(arguments[0], type) and issubclass(arguments[0], SceneModel):
-        return "list of tables"
-    if isinstance(annotation, type) and issubclass(annotation, signals.Given):
-        return re.sub("([a-z])([A-Z])", r"\1 \2", annotation.__name__).lower()
     if isinstance(annotation, type) and issubclass(annotation, SceneModel):
-        return "table"
+        name = re.sub("([a-z])([A-Z])", r"\1 \2", annotation.__name__).lower()
+        return name if issubclass(annotation, loads.Given) else "table"
     if origin in (typing.Union, UnionType):
-        return ", ".join(dict.fromkeys(kind(a, metadata) for a in arguments if a is not NoneType))
-    words = {bool: "true, false", str: "text", float: "number", int: "integer", dict: "table", tuple: "list"}
-    words |= {Callable: "Python function", Any: "list"}
+        return ", ".join(dict.fromkeys(kind(a) for a in arguments if a is not NoneType))
+    if any(getattr(m, "func", None) is padded for m in metadata):
+        return "2 or 3 numbers"
+    if origin is tuple:
+        entries = {kind(a) for a in arguments if a is not ...}
+        if entries == {"table"}:
+            return "list of tables"
+        if entries & {"list"} or any("numbers" in entry for entry in entries):
+            return "rows"
+        return "list" if ... in arguments or len(entries) > 1 else f"{len(arguments)} numbers"
+    words = {bool: "true, false", str: "text", dict: "table", Callable: "Python function", Any: "list"}
     return words[origin or annotation]
 
 

@@ -170,19 +170,15 @@ def _cut(text: str, longest: int) -> str:
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def _full_text(value: Any, depth: int = 0) -> str:
+def _full_text(value: Any) -> str:
     """Return a value in full, but for what `show` cuts off in any case: of a large table only the beginning."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value[: 2 * _LONGEST_VALUE], ensure_ascii=False)
-    if isinstance(value, Path):
+    if isinstance(value, str | Path):
         return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, list | tuple):
-        if depth > _LONGEST_VALUE:
-            return "[…]"
-        return f"[{', '.join(_full_text(entry, depth + 1) for entry in value[:_LONGEST_VALUE])}]"
+        return f"[{', '.join(map(_full_text, value[:_LONGEST_VALUE]))}]"
     try:
         return " ".join(repr(value).split())
-    except (ValueError, RecursionError):  # Python refuses to print integers of several thousand digits
+    except (ValueError, RecursionError):  # integers of thousands of digits, tables of thousands of levels
         return f"<{type(value).__name__}>"

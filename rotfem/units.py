@@ -104,9 +104,9 @@ def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") ->
 
 
 def speed_text(omega: float, digits: int = 6) -> str:
-    """Return an angular speed (rad/s) as messages have it: "3.8 rad/s", or "3.8 rad/s (36.2873 rpm)"."""
+    """Return an angular speed (rad/s) as messages have it: "3.8 rad/s", or "3.8 rad/s (36.3 rpm)"."""
     text, unit = f"{omega:.{digits}g} rad/s", SPEED.get()
-    return text if unit == "rad/s" else f"{text} ({omega / quantity(f'1 {unit}', 'rad/s'):.6g} {unit})"
+    return text if unit == "rad/s" else f"{text} ({omega / quantity(f'1 {unit}', 'rad/s'):.{digits}g} {unit})"
 
 
 def shown(unit: str) -> str:

@@ -1,26 +1,17 @@
-"""A computed answer, its setting, and the distance of two answers.
-
-    distance(a, b) = max |u_a − u_b| / max |u_a|,
-
-over all rows of a history, with u the displacement of the tip or the moment at the root; over all eigenvalues of modes
-it is the largest |λ_a − λ_b| / |λ_a|. Errors, refinement, the effects that a scene calls for and the cost of accuracy
-are all made of this.
-
-The tip is a section, whose points are displaced by u + θ × d, d their distance from its axis. With d a radius of
-gyration r the output is (u, r θ): a rotation counts by what it displaces.
-"""
+"""A computed answer of a scene, its setting, and the distance of two answers (`rotfem.results.distance`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol, Self
 
-import numpy as np
 import numpy.typing as npt
 
+from rotfem import registry
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, cpu_time
+from rotfem.results.distance import Distance, Series
 from rotfem.results.result import Result
 from rotfem.scene import Scene
 
@@ -104,125 +95,6 @@ class Setting:
         return f"{self.theory}, {cells}{length}"
 
 
-# --- outputs and their distance -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Distance:
-    """How far an answer is from another one.
-
-    Attributes:
-        size: largest difference, relative to the largest value (of eigenvalues, to each); infinite if that is 0.
-        at: time of the largest difference, s; None of what has no time.
-        each: of every component, or of every eigenvalue, relative to its own size.
-    """
-
-    size: float
-    at: float | None = None
-    each: Array = field(default_factory=lambda: np.empty(0))
-
-
-class Output(Protocol):
-    """What is compared of an answer."""
-
-    def apart(self, other: Any) -> Distance:
-        """Return how far another output of this kind is from this one, relative to this one."""
-        ...
-
-
-@dataclass(frozen=True)
-class Series:
-    """An output over time, or of a steady state.
-
-    Attributes:
-        times: (n,) s.
-        values: (n, components), m or N·m.
-    """
-
-    times: Array
-    values: Array
-
-    @property
-    def scale(self) -> float:
-        """Largest value over all rows."""
-        return float(np.linalg.norm(self.values, axis=-1).max(initial=0.0))
-
-    def difference(self, other: Series) -> Series:
-        """Return other − self at the rows of the one that has fewer; the other one is put there by a cubic spline."""
-        if np.array_equal(self.times, other.times):
-            return Series(self.times, other.values - self.values)
-        from scipy.interpolate import CubicSpline  # here, as its import takes longer than many a run
-
-        few, many, sign = (self, other, 1) if len(self.times) <= len(other.times) else (other, self, -1)
-        inside = (few.times >= many.times[0]) & (few.times <= many.times[-1])
-        there = CubicSpline(many.times, many.values)(few.times[inside])
-        return Series(few.times[inside], sign * (there - few.values[inside]))
-
-    def apart(self, other: Series) -> Distance:
-        """Return how far another one is from this one."""
-        change = self.difference(other)
-        off = np.linalg.norm(change.values, axis=-1)
-        largest = float(off.max(initial=0.0)) if np.all(np.isfinite(off)) else np.inf
-        sizes = np.abs(self.values).max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            each = np.nan_to_num(np.abs(change.values).max(axis=0, initial=0.0) / sizes, nan=0.0, posinf=np.inf)
-        return Distance(relative(largest, self.scale), float(change.times[np.argmax(off)]) if len(off) else None, each)
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Eigenvalues, with the shapes of their modes.
-
-    Attributes:
-        values: λ, (modes,), rad/s; 0 of what is zero to round-off.
-        shapes: sampled at the same places on every mesh, complex, (modes, samples); None to pair them by their order.
-    """
-
-    values: Array
-    shapes: Array | None = None
-
-    @property
-    def scale(self) -> float:
-        """Largest |λ|, rad/s."""
-        return float(np.abs(self.values).max(initial=0.0))
-
-    def apart(self, other: Spectrum) -> Distance:
-        """Return how far the most similar mode of another one is, of every mode, relative to its |λ|.
-
-        Of an eigenvalue that is zero it is relative to the smallest other one.
-        """
-        own, there = self.values, other.values
-        if len(own) == 0 or len(there) == 0:
-            return Distance(0.0 if len(own) == 0 else np.inf)
-        off = np.abs(there[None, :] - own[:, None])
-        if self.shapes is None or other.shapes is None:
-            off = off[:, : len(own)].diagonal() if len(there) >= len(own) else np.full(len(own), np.inf)
-        else:
-            here, others = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in _common(self.shapes, other.shapes))
-            alike = np.abs(here.conj() @ others.T)
-            off = np.where(alike >= 0.9 * alike.max(axis=1, keepdims=True), off, np.inf).min(axis=1)
-        each = off / sizes(own)
-        return Distance(float(each.max()), each=each)
-
-
-def _common(one: Array, other: Array) -> tuple[Array, Array]:
-    """Return the samples that two sets of shapes both have."""
-    there = ~(np.isnan(one[0]) | np.isnan(other[0]))
-    return one[:, there], other[:, there]
-
-
-def sizes(values: Array) -> Array:
-    """Return |λ|, of a zero that of the smallest other one."""
-    out = np.abs(values)
-    out[out == 0.0] = out[out > 0.0].min(initial=np.inf)
-    return out
-
-
-def relative(difference: float, scale: float) -> float:
-    """Return a difference over a scale; infinite where that is zero and the difference is not."""
-    return 0.0 if difference == 0.0 else difference / scale if scale > 0.0 else np.inf
-
-
 # --- answers ----------------------------------------------------------------------------------------------------------
 
 
@@ -231,12 +103,27 @@ class Outcome(Protocol):
 
     @property
     def output(self) -> Any:
-        """What is compared, an `Output`."""
+        """What is compared, a `Series` or a `Spectrum`."""
         ...
 
     @property
     def steps(self) -> int:
         """Number of steps that were taken, parts of steps counted each; 0 of what has no steps."""
+        ...
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether an equilibrium is stable; None where that is not asked."""
+        ...
+
+    @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of all vertices of the mesh along each axis."""
+        ...
+
+    @property
+    def round_off(self) -> float | None:
+        """Bound of the error by round-off, relative; None where none is known."""
         ...
 
     def result(self) -> Any:
@@ -281,13 +168,14 @@ class Answers:
     Args:
         scene: validated; an accuracy that it asks for is no part of its answers.
         compute: variant of the scene ↦ outcome.
+        moving: whether histories are computed, if the scene has [time].
 
     Attributes:
         times: rows (s) of all histories; None before the first, and of what has none.
     """
 
-    def __init__(self, scene: Scene, compute: Compute):
-        self.scene, self._compute = scene, compute
+    def __init__(self, scene: Scene, compute: Compute, moving: bool = True):
+        self.scene, self._compute, self.moving = scene, compute, moving and scene.time is not None
         self.times: Array | None = None
         self._found: dict[Setting, Answer | ComputationError | InputError] = {}
 
@@ -323,12 +211,15 @@ class Answers:
                 changes |= {"time.output_every": None}
             if setting.tolerance is None:
                 changes |= {"time.min_step": None}
+        if self.scene.model.prestress is not None and not registry.theories[setting.theory].prestress:
+            changes |= {"model.prestress": None}
         return self.scene.replace({**changes, **setting.changes(), "output.error": False})
 
-    @property
-    def seconds(self) -> float:
-        """CPU time of all answers together, s."""
-        return sum(found.seconds for found in self._found.values() if isinstance(found, Answer))
+    def keep(self, answer: Answer) -> None:
+        """Keep an answer that was computed elsewhere; histories have its rows."""
+        self._found[answer.setting] = answer
+        if isinstance(answer.output, Series):
+            self.times = answer.output.times
 
 
 def distance(one: Answer, other: Answer) -> Distance:

@@ -1,51 +1,43 @@
 """Modes followed over speed: which mode at one speed is which at the next.
 
-Two neighbouring speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the
-other, by an optimal one-to-one assignment. Where it is weak, or where two modes change places, the speed is refined:
-a veering then shows itself as two branches that keep their order, a true crossing as two that change it.
+Two speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the other, by an
+optimal one-to-one assignment. Where it is weak, or where two modes change places, the branches are followed on the way
+from one to the other through a model of the pencil between them (see `rotfem.analysis.reduced_basis.Between`), which
+costs no further solution. A veering then shows itself as two branches that keep their order, a true crossing as two
+that change it. A speed is inserted where that leaves a branch ambiguous.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.analysis.reduced_basis import Between
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import SAME
 from rotfem.structures.mode_names import Wave
 
-
-def root(f: Callable[[float], float], ends: tuple[float, float], at_ends: Sequence[float]) -> float | None:
-    """Return a number between two where f changes sign; None where f has no value on the way.
-
-    Args:
-        f: the function.
-        ends: the two numbers.
-        at_ends: f there, of different signs. Computed anew, a value near zero may come out with the other sign.
-    """
-    known, lost = dict(zip(ends, at_ends, strict=True)), []
-
-    def value(x: float) -> float:
-        found = known[x] if x in known else f(x)
-        lost.extend([] if np.isfinite(found) else [x])
-        return found if np.isfinite(found) else 0.0
-
-    found = float(brentq(value, *ends, xtol=1e-12, rtol=1e-10))
-    return None if lost else found
-
-
 Array = npt.NDArray[Any]
 
 #: Correlation (squared) from which a step needs no refinement, and below which it is called ambiguous.
 SURE, AMBIGUOUS = 0.9, 0.5
+
+#: Least step of the model between two speeds, in parts of their distance (a narrower veering passes as a crossing), and
+#: most of its steps: a veering takes 34.
+FINEST, STEPS = 1e-5, 200
+
+#: Relative error of zeros of a model, and of those that only say where to solve first; the same of critical speeds and
+#: onsets, by an estimate that is 150 times too small near a veering; iterations for that, usually two.
+ZEROS, FIRST, LOCATED, ITERATIONS = 1e-11, 1e-7, 1e-12, 40
 
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
@@ -102,17 +94,16 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     # The two products cancel the unknown scaling of x_b and y_b against each other.
     scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
     single = np.abs(here) * np.abs(there.T) / scale
-    joint = single.copy()
-    groups_a, groups_b = repeated(la, a.pairs.bounds), repeated(lb, b.pairs.bounds)
-    if len(groups_a) == len(la) and len(groups_b) == len(lb):
-        return joint, single
-    for i in groups_a:
-        for j in groups_b:
-            if len(i) > 1 or len(j) > 1:
-                part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
-                product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
-                joint[np.ix_(i, j)] = abs(np.trace(product)) / min(len(i), len(j))
-    return joint, single
+    groups = [repeated(lam, s.pairs.bounds) for lam, s in ((la, a), (lb, b))]
+    inverses = [np.diag(1.0 / np.where(d := own.diagonal(), d, np.inf)) for own in (own_a, own_b)]
+    for inverse, own, parts in zip(inverses, (own_a, own_b), groups, strict=True):
+        for i in (part for part in parts if len(part) > 1):
+            inverse[np.ix_(i, i)] = np.linalg.pinv(own[np.ix_(i, i)])
+    traces = (inverses[0] @ here @ inverses[1]) * there.T
+    firsts, sizes = ([[i[0] for i in parts] for parts in groups], [[len(i) for i in parts] for parts in groups])
+    sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
+    joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
+    return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
 
 
 def repeated(values: Array, bounds: Array) -> list[list[int]]:
@@ -174,77 +165,215 @@ def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
+class Model(Protocol):
+    """Modes between two speeds without a solution of the whole system."""
+
+    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
+        """Return the modes at both ends in the coordinates of the model."""
+        ...
+
+    def between(self, speed: float) -> Spinning:
+        """Return the modes at a speed, rad/s."""
+        ...
+
+
+class BranchPath:
+    """Branches on the way from one solved speed to another, whose `order` is set.
+
+    Args:
+        left: the first speed, its branches known.
+        right: the other one.
+        model: of the pencil between them; made only where it is asked for.
+        count: number of branches that matter.
+
+    Attributes:
+        points: both, and those of the model between which a step is sure, or cannot be smaller.
+        weak: branch ↦ squared correlation, of those that are ambiguous.
+        hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
+    """
+
+    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], Model], count: int):
+        self.left, self.right, self.count, self._make = left, right, count, model
+        self.weak: dict[int, float] = {}
+        self.hidden: float | None = None
+        self.points = [left, right]
+        assign(left, right)
+        if self._unsure(left, right):
+            self._follow()
+
+    @cached_property
+    def model(self) -> Model:
+        """Model of the modes between the two speeds."""
+        return self._make()
+
+    @cached_property
+    def _ends(self) -> list[SpeedPoint]:
+        """Both points as the model has them."""
+        both = zip((self.left, self.right), self.model.ends(self.left.spinning, self.right.spinning), strict=True)
+        return [replace(point, spinning=spinning) for point, spinning in both]
+
+    def _unsure(self, a: SpeedPoint, b: SpeedPoint) -> bool:
+        weak = b.confidence[: self.count][a.order[: self.count] >= 0] < SURE
+        return bool(np.any(weak)) or swapped(a, b, self.count)
+
+    def _follow(self) -> None:
+        """Follow the branches through the model."""
+        first, last = self._ends
+        self.points, self._steps = [first], 0
+        through = SpeedPoint(self.model.between(last.speed), False)
+        self._advance(through)
+        assign(through, last)  # the same modes, of which the model has more
+        lost, least = last.order < 0, np.min([p.confidence for p in self.points[1:]], axis=0)
+        self.right.order, self.right.conjugate = last.order, last.conjugate
+        self.right.confidence = np.where(lost, 0.0, least)
+        self.points = [self.left, *self.points[1:-1], self.right]
+        count = len(first.spinning.pairs.values)
+        known = {None, unstable(first.spinning), unstable(last.spinning)}
+        growing = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
+        if growing:
+            self.hidden = max(growing, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
+
+    def _advance(self, target: SpeedPoint) -> None:
+        """Append a point of the model, and points before it as long as the step is not sure."""
+        last = self.points[-1]
+        assign(last, target)
+        if self._unsure(last, target):
+            if target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed) and self._steps < STEPS:
+                self._steps += 1
+                self._advance(SpeedPoint(self.model.between(0.5 * (last.speed + target.speed)), False))
+                self._advance(target)
+                return
+            for b in range(self.count):
+                if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS:
+                    self.weak[b] = min(self.weak.get(b, 1.0), float(target.confidence[b]))
+        self.points.append(target)
+
+    def at(self, speed: float) -> SpeedPoint:
+        """Return the modes of the model at a speed, joined with the branches."""
+        left = [self._ends[0], *(p for p in self.points[1:-1] if p.speed <= speed)][-1]
+        point = SpeedPoint(self.model.between(speed), False)
+        assign(left, point)
+        return point
+
+    def zeros(self, f: Callable[[SpeedPoint], float], off: float = ZEROS) -> Iterator[tuple[float, float]]:
+        """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before.
+
+        What it differs by between the modes solved at both ends and those of the model there, is taken off linearly.
+        """
+        (a, b), known = (self.left.speed, self.right.speed), {p.speed: f(p) for p in (self.left, self.right)}
+        apart = [known[x] - f(self.at(x)) for x in (a, b)]
+
+        def g(x: float) -> float:
+            try:
+                value = f(self.at(x))
+            except ComputationError:  # K is singular: this is the speed
+                return 0.0
+            return value + apart[0] + (x - a) / (b - a) * (apart[1] - apart[0])
+
+        known |= {p.speed: g(p.speed) for p in self.points[1:-1]}
+        for (low, before), (high, after) in pairwise(sorted(known.items())):
+            if before * after < 0.0:
+                speed = brentq(
+                    lambda x: known[x] if x in known else g(x), low, high, xtol=off * max(abs(a), abs(b)), rtol=off
+                )
+                yield float(speed), float(np.sign(before))
+
+
 class Sweep:
     """A Campbell diagram in the making.
 
     Args:
         analysis: compiled scene.
         count: number of branches.
-        most: speeds that may be solved; those asked for are in any case.
+        only: whether no other speeds may be solved than those asked for.
 
     Attributes:
         known: speed ↦ modes there that are solved already.
         each: (items, work) ↦ what the work makes of every item; processes may share them out.
+        paths: between each two points.
+        solves: speeds solved.
     """
 
-    def __init__(self, analysis: ModalAnalysis, count: int, most: float = np.inf):
-        self.analysis, self.count = analysis, count
+    def __init__(self, analysis: ModalAnalysis, count: int, only: bool = False):
+        self.analysis, self.count, self.only = analysis, count, only
         self.known: dict[float, Spinning] = {}
         self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
-        self.points: list[SpeedPoint] = []
-        self.solves, self.most_solves, self.unresolved = 0, most, False
+        self.points, self.paths = list[SpeedPoint](), list[BranchPath]()
+        self.solves = self.inserted = 0
         self.ambiguous: list[dict[str, float]] = []
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the model between speeds is the analysis itself."""
+        return self.analysis.is_model
 
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> SpeedPoint:
         """Return the modes at a speed, its equilibrium continued from start."""
-        self.solves += 1
         known = self.known.pop(speed, None)
+        self.solves += known is None
         return SpeedPoint(known or self.analysis.at(speed, self.count + SPARE, start), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
-        """Follow the modes over increasing speeds."""
+        """Follow the modes over increasing speeds.
+
+        At most as many speeds are inserted as were asked for, and four.
+        """
         first = self.solve(speeds[0], None, True)
         total = len(first.spinning.pairs.values)
         first.order, first.confidence = np.arange(total), np.ones(total)
         first.conjugate = np.zeros(total, dtype=bool)
-        self.points = [first]
-        self.finest = 1e-5 * max(speeds[-1] - speeds[0], 1e-300)  # a narrower veering passes as a crossing
-        self.most_solves = min(self.most_solves, 1000 + 41 * len(speeds))  # a veering takes 17
+        self.points, self._room = [first], 0 if self.only else len(speeds) + 4
         for i, speed in enumerate(speeds[1:], start=1):
-            if speeds[i - 1] < 0.0 < speed:  # where the lines ω = k|Ω| have a kink
-                self._advance(self.solve(0.0, self.points[-1].spinning, False))
+            if speeds[i - 1] < 0.0 < speed and self._room:  # where the lines ω = k|Ω| have a kink
+                self._insert(0.0)
             self._advance(self.solve(speed, self.points[-1].spinning, True))
             progress(i / (len(speeds) - 1))
 
-    def _advance(self, target: SpeedPoint) -> None:
-        """Append a point, and points before it as long as the step is not sure."""
-        last = self.points[-1]
-        confidence = assign(last, target)
-        near = self._may_meet(last, target)
-        if (confidence < SURE and near) or swapped(last, target, self.count):
-            self.unresolved |= self.solves >= self.most_solves
-            if target.speed - last.speed > 2 * self.finest and not self.unresolved:
-                middle = 0.5 * (last.speed + target.speed)
-                self._advance(self.solve(middle, last.spinning, False))
-                self._advance(target)
-                return
-            weak = [b for b in range(self.count) if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS]
-            self.ambiguous += [
-                {"branch": b + 1, "speed": target.speed, "confidence": float(target.confidence[b])} for b in weak
-            ]
-        self.points.append(target)
+    def _insert(self, speed: float) -> None:
+        self._room, self.inserted = self._room - 1, self.inserted + 1
+        self._advance(self.solve(speed, self.points[-1].spinning, False))
 
-    def _may_meet(self, last: SpeedPoint, target: SpeedPoint) -> bool:
-        """Return whether a branch that is asked for (not only a spare one) is unsure."""
-        return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
+    def _advance(self, target: SpeedPoint) -> None:
+        """Append a point, and one before it where the model between cannot tell the branches."""
+        last = self.points[-1]
+        path = self._path(last, target)
+        if self._room and (path.hidden is not None or path.weak or self._depends_on_model(path)):
+            self._insert(path.hidden or 0.5 * (last.speed + target.speed))
+            self._advance(target)
+            return
+        self.ambiguous += [
+            {"branch": b + 1, "speed": target.speed, "confidence": value} for b, value in sorted(path.weak.items())
+        ]
+        self.points.append(target)
+        self.paths.append(path)
+
+    def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> BranchPath:
+        """Return the way from one point to another; if `square` its model knows the points beside them, too."""
+
+        def model() -> Model:
+            if self.is_exact:
+                return cast(Model, self.analysis)
+            points = self.points if square else []
+            beside = [p for p in points if p.speed < left.speed][-1:] + [p for p in points if p.speed > right.speed][:1]
+            known = {p.speed: p.spinning for p in (left, right, *beside) if p.speed * (left.speed + right.speed) >= 0.0}
+            square_too = square and left.speed * right.speed >= 0.0
+            return Between((left.spinning, right.spinning), list(known.values()), square_too)
+
+        return BranchPath(left, right, model, self.count)
+
+    def _depends_on_model(self, path: BranchPath) -> bool:
+        """Return whether a model that is known to be poorer leads the branches elsewhere."""
+        if len(path.points) == 2 or self.is_exact:
+            return False
+        other = replace(path.right)
+        self._path(path.left, other, square=False)
+        return bool(np.any(other.order[: self.count] != path.right.order[: self.count]))
+
+    def found(self) -> list[float]:
+        """Return all frequencies of the branches, rad/s."""
+        return [point.value(b).imag for point in self.points for b in range(self.count)]
 
     # --- what the diagram says ----------------------------------------------------------------------------------------
-
-    def between(self, left: SpeedPoint, speed: float) -> SpeedPoint:
-        """Return the modes at a speed to the right of a point, joined with its branches."""
-        point = self.solve(speed, left.spinning, False)
-        assign(left, point)
-        return point
 
     def wave(self, point: SpeedPoint, branch: int) -> Wave | None:
         """Return how the mode of a branch precesses at a point; None where it is lost or no rotor's."""
@@ -268,26 +397,24 @@ class Sweep:
         Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
         """
         wanted, out = list[tuple[int, int, int | None]](), []
-        for i, (left, right) in enumerate(pairwise(self.points)):
+        for i, right in enumerate(self.points[1:]):
             for b in range(self.count):
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
-                lines = (None, *sorted({*orders, against} - {0}))
-                wanted += [(i, b, k) for k in lines if self._between(left, right, b, k)]
-        for (i, b, k), (speed, solves) in zip(wanted, self.each(wanted, self._meeting), strict=True):
+                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0})) if self._meets(i, b, k)]
+        for (i, b, k), (speeds, solves) in zip(wanted, self.each(wanted, self._meetings), strict=True):
             self.solves += solves
-            if speed is None:
-                continue
             left, right = self.points[i : i + 2]
             wave = self.wave(left if k is None else right, b)
             way = self.direction(right, b)
-            if k is None:
-                if wave is not None and not wave.fixed:
-                    out.append(self._critical(b, "forward", 1, 0, speed))
-            elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and way)):
-                out.append(self._critical(b, way, wave.number, k, speed))
-            elif k in orders:
-                out.append(self._critical(b, "per_rev", k, k, speed))
+            for speed in speeds:
+                if k is None:
+                    if wave is not None and not wave.fixed:
+                        out.append(self._critical(b, "forward", 1, 0, speed))
+                elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and way)):
+                    out.append(self._critical(b, way, wave.number, k, speed))
+                elif k in orders:
+                    out.append(self._critical(b, "per_rev", k, k, speed))
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
 
     def _critical(self, branch: int, kind: str, order: int, k: int, speed: float) -> dict[str, Any]:
@@ -302,36 +429,71 @@ class Sweep:
         omega = 0.0 if zero else point.signed(b)
         return omega if k is None else abs(omega) - k * abs(point.speed)
 
-    def _between(self, left: SpeedPoint, right: SpeedPoint, b: int, k: int | None) -> bool:
+    def _meets(self, i: int, b: int, k: int | None) -> bool:
         """Return whether a branch has the frequency kΩ, or passes zero without k, between two points.
 
         What has no frequency at rest is on all lines there.
         """
-        one, other = (self._gap(point, b, k) for point in (left, right))
-        return one * other < 0.0 or (abs(one) > 0.0 and other == 0.0 and right.speed != 0.0)
+        gaps = np.array([self._gap(point, b, k) for point in self.paths[i].points])
+        at_end = abs(gaps[0]) > 0.0 and gaps[-1] == 0.0 and self.points[i + 1].speed != 0.0
+        return bool(at_end or np.any(gaps[1:] * gaps[:-1] < 0.0))
 
-    def _meeting(self, place: tuple[int, int, int | None]) -> tuple[float | None, int]:
-        """Return the speed after the point i where a branch b has the frequency kΩ, or None, and solutions it took."""
+    def _meetings(self, place: tuple[int, int, int | None]) -> tuple[list[float], int]:
+        """Return the speeds after the point i where a branch b has the frequency kΩ, and solutions that took."""
         i, b, k = place
-        left, right = self.points[i : i + 2]
-        before, self.solves = self.solves, 0
-        met = list[bool]()  # whether the frequency is on the line to its error bound; twice, then round-off is followed
+        before, self.solves, path = self.solves, 0, self.paths[i]
 
-        def f(speed: float) -> float:
-            try:
-                point = self.between(left, speed)
-            except ComputationError:
-                if k is None:
-                    return 0.0  # K is singular: this is the speed
-                raise
-            gap, pairs, j = self._gap(point, b, k), point.spinning.pairs, point.order[b]
-            met.append(k is not None and abs(gap) <= pairs.bounds[j] * abs(pairs.values[j]))
-            return 0.0 if sum(met) == 2 else gap
+        def f(point: SpeedPoint) -> float:
+            return self._gap(point, b, k)
 
-        ends = [self._gap(point, b, k) for point in (left, right)]
-        speed = right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)
+        def met(point: SpeedPoint) -> bool:
+            pairs, j = point.spinning.pairs, point.order[b]
+            return k is not None and abs(f(point)) <= pairs.bounds[j] * abs(pairs.values[j])
+
+        off = ZEROS if self.is_exact else FIRST
+        found = [self._located(path, f, speed, sign, met) for speed, sign in path.zeros(f, off)]
+        if f(path.right) == 0.0:
+            found.append(path.right.speed)
         taken, self.solves = self.solves, before
-        return speed, taken
+        return found, taken
+
+    def _located(
+        self,
+        path: BranchPath,
+        f: Callable[[SpeedPoint], float],
+        speed: float,
+        sign: float,
+        met: Callable[[SpeedPoint], bool] = lambda point: False,
+    ) -> float:
+        """Return the speed on a path where a function of the modes changes its sign, to LOCATED.
+
+        At the speed that the model has, the modes are solved; with them the model is exact there. From one such
+        solution to the next the error is squared, in parts of the distance of the points.
+
+        Args:
+            path: between two points.
+            f: point ↦ number.
+            speed: where the model has the zero.
+            sign: of f before it.
+            met: whether f is zero at a point but for the error bound of the modes there.
+        """
+        if self.is_exact or self.only:
+            return speed
+        for _ in range(ITERATIONS):
+            try:
+                point = self.solve(speed, path.left.spinning, False)
+            except ComputationError:  # K is singular: this is the speed
+                return speed
+            part = self._path(path.left, point)
+            if f(point) * sign > 0.0:
+                part = self._path(point, replace(path.right))
+            there = [x for x, s in part.zeros(f) if s == sign]
+            if not there or met(point):
+                return speed
+            before, speed = speed, min(there, key=lambda x: abs(x - speed))
+            if (speed - before) ** 2 <= LOCATED * abs(speed) * (path.right.speed - path.left.speed):
+                return speed
+        return speed
 
     def onsets(self) -> list[dict[str, Any]]:
         """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.
@@ -346,10 +508,10 @@ class Sweep:
         out: list[dict[str, Any]] = []
         if kinds[0] is not None:
             out.append({"speed": self.points[0].speed, "kind": kinds[0], "until": None})
-        for i, (before, after) in enumerate(pairwise(kinds)):
+        for path, (before, after) in zip(self.paths, pairwise(kinds), strict=True):
             if before == after:
                 continue
-            speed = self._bisect(self.points[i], self.points[i + 1], before, after)
+            speed = self._changes(path, before, after)
             if speed is None:
                 continue
             if before is not None and out:
@@ -359,18 +521,20 @@ class Sweep:
         ends = [np.inf if r["until"] is None else r["until"] for r in out]
         return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
 
-    def _bisect(self, left: SpeedPoint, right: SpeedPoint, before: str | None, after: str | None) -> float | None:
+    def _changes(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
         """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
-        low, high = left.spinning, right.speed
-        while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
-            speed = 0.5 * (low.speed + high)
-            try:
-                middle = self.solve(speed, low, False).spinning
-            except ComputationError:  # K is singular: this is the speed
-                return speed
-            low, high = (middle, high) if unstable(middle, bounded=False) == before else (low, speed)
-        worst = max(low.pairs.values, key=lambda lam: lam.real)
-        return None if after is None and worst.real > 1e-2 * abs(worst) else high
+        count = len(path.left.spinning.pairs.values)  # a model has more
+
+        def f(point: SpeedPoint) -> float:
+            return 1.0 if unstable(point.spinning.first(count), bounded=False) == before else -1.0
+
+        places = [speed for speed, sign in path.zeros(f) if sign > 0.0]
+        if not places:
+            return None
+        speed = self._located(path, f, places[0], 1.0)
+        before_it = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning
+        worst = max(before_it.pairs.values, key=lambda lam: lam.real)
+        return None if after is None and worst.real > 1e-2 * abs(worst) else speed
 
 
 def unstable(spinning: Spinning, bounded: bool = True) -> str | None:

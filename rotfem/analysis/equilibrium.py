@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.analysis.conditioning import KNOWN, rounded_compliance
 from rotfem.analysis.load_steps import (
     REGULAR_SHARE,
     SMALLEST_SHARE,
@@ -25,15 +26,15 @@ from rotfem.analysis.load_steps import (
     raised,
     richest_advice,
 )
-from rotfem.analysis.theory_error import KNOWN, rounded_compliance
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
-from rotfem.mechanics.loads import ConstantLoad, Loads
+from rotfem.mechanics.loads import Load, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.newton import Newton
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def steady_state(
         if not (loose and (lost or growth.start is None)):
             raise
         raise ComputationError(
-            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {omega:g} rad/s: "
+            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {speed_text(omega)}: "
             "the load turns it, and no equilibrium was found that it turns to",
             advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
         ) from error
@@ -111,7 +112,9 @@ def _grown(system: Any, growth: LoadFactors, newton: Newton, notes: list[str]) -
     found = raised(system, growth, newton)
     if found.least < REGULAR_SHARE:
         if _compliance_lost(system, growth):
-            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: steps of the load were cut for ever")
+            raise ComputationError(
+                f"no steady state at {speed_text(growth.omega)}: steps of the load were cut for ever"
+            )
         system.count_rotations_from(found.reference)
         growth.set(system, 1.0)
         system.set_state(found.q)
@@ -143,7 +146,7 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
     Raises:
         ComputationError: no equilibrium with this displacement was found; says how far the tip was led.
     """
-    still, force = Motion.constant_speed(0.0), Loads(tip_force=ConstantLoad((0.0, 1.0, 0.0)))
+    still, force = Motion.constant_speed(0.0), Loads(named={"tip_force": Load.of_components((0.0, 1.0, 0.0))})
     resting = problem.replace(frame="rotating", effects=(), motion=still, loads=force, terms={}, outputs={})
     system = compile_system(resting, comm, moving=False)
     q: Array = system.zeros()

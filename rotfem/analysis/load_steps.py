@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.theory_error import KNOWN, conditioning
+from rotfem.analysis.conditioning import KNOWN, conditioning
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
 from rotfem.numerics.linear import DirectSolver, negative_count
 from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.reference_rotation import BeyondReach
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -107,7 +108,7 @@ class LoadFactors:
 
     def where(self, share: float) -> str:
         """Return a share of the load in words, with its speed where that grows."""
-        speed = f" ({self.speed(share):.4g} rad/s)" if self.omega and self.spin[0] != self.spin[1] else ""
+        speed = f" ({speed_text(self.speed(share), 4)})" if self.omega and self.spin[0] != self.spin[1] else ""
         return f"{share:.6g} of the load{speed}"
 
 
@@ -168,7 +169,7 @@ def _ended(
     why = f"beyond it the structure snaps, or there is none ({failure})"
     if stretch >= 2.0:
         why = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
-    what = f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; {why}"
+    what = f"no steady state at {speed_text(growth.omega)}: the last equilibrium was at {growth.where(done)}; {why}"
     return ComputationError(what, advice=less(system))
 
 
@@ -251,7 +252,7 @@ def balance(
     increment = limited(system, q, correction)
     if system.linear:
         if not np.isfinite(increment(True)[0]) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
-            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: the stiffness is singular")
+            raise ComputationError(f"no steady state at {speed_text(growth.omega)}: the stiffness is singular")
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))

@@ -36,7 +36,7 @@ from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
-from rotfem.structures.mode_names import Wave, with_overdamped, with_whirl
+from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
 
 Array = npt.NDArray[Any]
 
@@ -199,7 +199,10 @@ class ModalAnalysis:
         estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
+        is_model: whether it is a model of itself between speeds (see `rotfem.analysis.branches.Model`).
     """
+
+    is_model = False
 
     def __init__(
         self,
@@ -254,13 +257,8 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        matrices = self.system.mass_damping_stiffness(keep)
-        if self.fixed is not None:
-            matrices = self.fixed(matrices, speed)
-        clamped = Pencil(*matrices)
-        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        pencil, clamped = self._pencils(speed, keep)
         t2 = perf_counter()
-        clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.near, pencil.factor = near, self.system.analysed
@@ -286,6 +284,25 @@ class ModalAnalysis:
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
         return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
+
+    def _pencils(self, speed: float, keep: bool) -> tuple[Pencil, Pencil]:
+        """Return the pencil at the state and speed (rad/s) that are set, and the same with the hub held."""
+        matrices = self.system.mass_damping_stiffness(keep)
+        if self.fixed is not None:
+            matrices = self.fixed(matrices, speed)
+        clamped = Pencil(*matrices)
+        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        clamped.unit = pencil.unit = self._unit
+        return pencil, clamped
+
+    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool) -> Spinning:
+        """Return what `at` has found at a speed (rad/s): equilibrium q, pairs, and whether the hub turns freely."""
+        held = self.system.held
+        held.set_time(0.0, held.motion.at_speed(speed))
+        held.set_state(q)
+        pencil, clamped = self._pencils(speed, keep=True)
+        clamped.owner = pencil.owner = self
+        return Spinning(speed, q, pencil, pairs, clamped, rigid)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
@@ -397,17 +414,13 @@ class Described:
         return found
 
     @cached_property
-    def names(self) -> list[str]:
-        """The name "kind n" of every mode, as its structure counts them; mixed ones name both families.
-
-        Of a rotor the direction follows: "bending 1 backward".
-        """
+    def names(self) -> list[ModeName]:
+        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
         families, out = [name for name in self.shares if name != "hub"], []
         for j, x in enumerate(self._right.T):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            kind, number = self._structure.mode_name(first, *self._structure.nodes(x))
-            mixed = others and self.shares[first][j] < 0.8
-            out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
+            name = self._structure.mode_name(first, *self._structure.nodes(x))
+            out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)
         pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]

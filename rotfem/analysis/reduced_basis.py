@@ -1,8 +1,10 @@
-"""Modes of a linear system over a range of speeds, by a basis of its modes at a few of them.
+"""Modes over a range of speeds, by a basis of modes at a few of them.
 
-With the columns V of modes at some speeds, orthonormal in the stiffness at rest, (λ² M + λ C + K) x = 0 becomes the
-small problem of VᵀMV, VᵀCV and VᵀKV, whose pieces (of Omega, Omega², …) are projected once. It keeps symmetry and
-skewness, so it is a pencil like the full one. The basis grows until full solutions at speeds between agree.
+In a linear theory, with the columns V of modes at some speeds, orthonormal in the stiffness at rest,
+(λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV and VᵀKV, whose pieces (of Omega, Omega², …) are
+projected once. It keeps symmetry and skewness, so it is a pencil like the full one. The basis grows until full
+solutions at speeds between agree. In the other theories the pencil is interpolated between two speeds that are solved,
+to see which modes are one and where a solution is worth its time.
 """
 
 from __future__ import annotations
@@ -17,15 +19,20 @@ from numpy.linalg import norm
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.errors import ComputationError
+from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED
-from rotfem.numerics.projection import dense, orthonormal, summed, times
+from rotfem.numerics.projection import dense, orthonormal, spanned, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
 
 #: Speeds from which a basis saves time: it takes three full solutions at least.
 MANY = 3
+
+#: Modes between two speeds beyond those that are known at both: those that a branch may pass through.
+FURTHER = 3
 
 #: Entries of lifted eigenvectors that are computed together: some ten arrays of 16 MB.
 TOGETHER = 1_000_000
@@ -171,6 +178,8 @@ class ReducedAnalysis(ModalAnalysis):
         checks: speeds of full solutions with the largest relative difference of a frequency found there.
     """
 
+    is_model = True
+
     def __init__(self, full: ModalAnalysis):
         self.full = full
         self.basis = ProjectedPieces(full.system)
@@ -192,6 +201,7 @@ class ReducedAnalysis(ModalAnalysis):
         """
         for speed in (first, last):
             self._add(self._solve(speed, count))
+        self._count = count
         if self.full.kept.used:  # which the pieces do not keep
             return False
         self._project()
@@ -244,19 +254,32 @@ class ReducedAnalysis(ModalAnalysis):
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         return self.at_all([speed], count)[0]
 
-    def at_all(self, speeds: Sequence[float], count: int) -> list[Spinning]:
-        """Return what `at` does at several speeds, with the errors of all pairs in one go."""
-        part = max(1, TOGETHER // (count * self.system.material.getSize()[0]))
-        if len(speeds) > part:
-            return [s for i in range(0, len(speeds), part) for s in self.at_all(speeds[i : i + part], count)]
-        zero, motion = self.system.zeros(), self.system.motion
+    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
+        """Return the modes at two speeds as `between` has them."""
+        return first, last
+
+    def between(self, speed: float) -> Spinning:
+        """Return some more modes of the basis at a speed (rad/s), without their errors in the full system."""
+        return self._small([speed], self._count + FURTHER)[0]
+
+    def _small(self, speeds: Sequence[float], count: int) -> list[Spinning]:
+        """Return the eigenpairs of the basis at some speeds, with errors of the small problem."""
+        zero, motion, out = self.system.zeros(), self.system.motion, []
         c = np.array([self.system.coefficients(motion.at_speed(speed)) for speed in speeds])
-        out = []
         for speed, M, C, K in zip(speeds, *self.basis.operators(c), strict=True):
             pencil = SmallPencil(M, C, K, self._root, self._asymmetries)
             pencil.owner = self
             pairs = pencil.solve(min(count, self.V.shape[1] - 1))
             out.append(Spinning(speed, zero, pencil, pairs, pencil))
+        return out
+
+    def at_all(self, speeds: Sequence[float], count: int) -> list[Spinning]:
+        """Return what `at` does at several speeds, with the errors of all pairs in one go."""
+        part = max(1, TOGETHER // (count * self.system.material.getSize()[0]))
+        if len(speeds) > part:
+            return [s for i in range(0, len(speeds), part) for s in self.at_all(speeds[i : i + part], count)]
+        out = self._small(speeds, count)
+        c = np.array([self.system.coefficients(self.system.motion.at_speed(speed)) for speed in speeds])
         numbers = [len(s.pairs.values) for s in out]
         values, right, left = (np.hstack([getattr(s.pairs, n) for s in out]) for n in ("values", "right", "left"))
         errors = self._backward_errors(values, right, np.repeat(c[:, self._index], numbers, axis=0).T)
@@ -292,3 +315,67 @@ class ReducedAnalysis(ModalAnalysis):
         residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real
         lengths = np.sum(right.conj() * product(self._metric, right), axis=0).real
         return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
+
+
+class Between:
+    """Modes between two speeds that are solved, by interpolation of the pencil in a basis of the modes at both.
+
+    M and C are polynomials of the speed Ω through what they are at the nodes, K is one of Ω², as the centrifugal force
+    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved, but
+    for round-off in K.
+
+    Args:
+        both: the modes at the ends.
+        nodes: all that the polynomials go through; both ends among them, and no two speeds of different sign.
+        square: whether K is a polynomial of Ω², or else of Ω.
+    """
+
+    def __init__(self, both: tuple[Spinning, Spinning], nodes: Sequence[Spinning], square: bool = True):
+        pencil, self._square = both[0].pencil, square
+        self._scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
+        vectors = np.hstack([v for s in both for v in (s.pairs.right, s.pairs.left)]) / self._scale
+        self._comm, self._V = pencil.comm, spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
+        self._speeds = np.array([s.speed for s in nodes])
+        X = self._scale * self._V
+        self._matrices = np.array(
+            [[summed(self._comm, X.T @ times(A, X)) for A in (p.M, p.C, p.K)] for p in (s.pencil for s in nodes)]
+        )
+        self._asymmetries = {name: max(s.pencil.asymmetries[name] for s in both) for name in "MCK"}
+        self._count = max(len(s.pairs.values) for s in both) + FURTHER
+
+    def _pencil(self, speed: float) -> SmallPencil:
+        def weights(at: float, places: Array) -> Array:
+            apart = places[:, None] - places
+            np.fill_diagonal(apart, 1.0)
+            there = np.tile(at - places, (len(places), 1))
+            np.fill_diagonal(there, 1.0)
+            return np.asarray(np.prod(there / apart, axis=1))
+
+        plain = weights(speed, self._speeds)
+        squared = weights(speed**2, self._speeds**2) if self._square else plain
+        M, C, K = (
+            np.tensordot(w, A, 1) for w, A in zip((plain, plain, squared), self._matrices.swapaxes(0, 1), strict=True)
+        )
+        return SmallPencil(M, C, K, root_of(0.5 * (M + M.T)), self._asymmetries)
+
+    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
+        """Return the modes at both ends as `between` has them."""
+        return self._inside(first), self._inside(last)
+
+    def _coordinates(self, X: Array) -> Array:
+        return np.asarray(summed(self._comm, product(self._V.T, X / self._scale)))
+
+    def _inside(self, s: Spinning) -> Spinning:
+        right, left = (self._coordinates(v) for v in (s.pairs.right, s.pairs.left))
+        pairs, pencil = s.pairs, self._pencil(s.speed)
+        return Spinning(s.speed, s.q, pencil, Eigenpairs(pairs.values, right, left, pairs.errors, pairs.bounds), pencil)
+
+    def between(self, speed: float) -> Spinning:
+        """Return some more modes of the interpolated pencil at a speed (rad/s)."""
+        pencil, count = self._pencil(speed), self._count
+        try:
+            pairs = pencil.solve(count)
+        except ComputationError:  # K is singular: aim beside zero
+            least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
+            pairs = pencil.solve(count, 0.1 * float(np.sqrt(least)))
+        return Spinning(speed, np.empty(0), pencil, pairs, pencil)

@@ -183,7 +183,7 @@ class Scheme(ABC):
     name: ClassVar[str]
     order: ClassVar[int]
     stages: ClassVar[int] = 1
-    #: Whether a step of a free hub starts with the part of a jump of accelerations that it resolves (see `Stepper`).
+    #: Whether a step of a free hub starts with the part of a jump of accelerations that it resolves (see `March`).
     filters_jumps: ClassVar[bool] = False
 
     #: (C, m, s) of the `local_error` of a vibration of frequency ω and amplitude A: C (ωh)^m A where it is resolved,

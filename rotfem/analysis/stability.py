@@ -33,6 +33,7 @@ from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -83,7 +84,7 @@ class Stability:
                 f"unstable equilibrium: the stiffness has {self.negative} negative eigenvalues; the growth rate could "
                 "not be computed"
             )
-        kind = "static instability" if self.frequency == 0.0 else f"flutter at {self.frequency:.6g} rad/s"
+        kind = "static instability" if self.frequency == 0.0 else f"flutter at {speed_text(self.frequency)}"
         count = "" if self.negative is None else f", negative eigenvalues of the stiffness: {self.negative}"
         return f"unstable equilibrium: a small disturbance grows as exp({self.growth:.6g} t) ({kind}{count})"
 

@@ -10,6 +10,7 @@ from rotfem.listeners import Hint
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import theories
 from rotfem.scene.scene import Scene
+from rotfem.units import speed_text
 
 
 def advise(
@@ -47,8 +48,9 @@ def _softening(scene: Scene, speed: float, critical: float) -> list[str]:
         return []
     stiffened = min((t for t in theories if t.linear and t.prestress), key=lambda t: t.rank)
     return [
-        f'model.theory = "{theory.name}" has no centrifugal stiffening, and loses its stiffness at {critical:.3g} '
-        f'rad/s; the scene reaches {speed:.3g} rad/s: use "{stiffened.name}", which costs the same'
+        f'model.theory = "{theory.name}" has no centrifugal stiffening, and loses its stiffness at '
+        f'{speed_text(critical, 3)}; the scene reaches {speed_text(speed, 3)}: use "{stiffened.name}", which costs '
+        "the same"
     ]
 
 

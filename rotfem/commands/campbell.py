@@ -2,69 +2,77 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.accuracy.answer import Setting
+from rotfem.accuracy.errors import Errors, warnings_of
+from rotfem.accuracy.modes import modal_errors
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import in_basis
 from rotfem.commands.advice import frozen_inputs
-from rotfem.commands.error_report import error_of_modes
+from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
+from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.commands.recorder import check_rows
-from rotfem.errors import SceneError
+from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
-from rotfem.refinement.frequencies import FrequencyErrors
+from rotfem.numerics.eigenproblem import Eigenpairs
 from rotfem.results import CampbellResult
+from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.values import LARGEST, Limits
-from rotfem.structures.mode_names import distinct, engineers_name
-from rotfem.units import split_unit
+from rotfem.scene.values import LARGEST
+from rotfem.structures.mode_names import distinct
+from rotfem.units import speed_text, split_unit
+from rotfem.version import __version__
 
 Array = npt.NDArray[Any]
 
+#: What eigenpairs are made of.
+PAIRS = ("values", "right", "left", "errors", "bounds")
 
-def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
+
+def parse_speeds(text: str) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
 
     Args:
         text: what was asked for.
-        limits: of the scene; the usual ones if None.
 
     Raises:
-        SceneError: the text is neither, the speeds do not increase, or are too many.
+        SceneError: the text is neither, or the speeds do not increase.
     """
-    limits = limits or Limits()
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
     )
-    speeds, why = list[float](), None
+    speeds = list[float]()
     with suppress(ValueError):
         numbers, unit = split_unit(text)
         if ":" in numbers:
             first, last, number = numbers.split(":")
             ends, count = (float(first) * unit, float(last) * unit), int(number)
-            why = limits.refusal("speeds", count)
-            if why is None and max(map(abs, ends)) <= LARGEST:
+            if max(map(abs, ends)) <= LARGEST:
                 speeds = [float(s) for s in np.linspace(*ends, count)]
         else:
             speeds = [float(s) * unit for s in numbers.split(",")]
-            why = limits.refusal("speeds", len(speeds))
-    if why or len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
-        raise SceneError("command line", "--speeds", text, why or allowed)
+    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, allowed)
     return speeds
 
 
@@ -76,6 +84,8 @@ def campbell(
     orders: int | Sequence[int] | None = None,
     rated: float | str | None = None,
     operating: Sequence[float | str] | None = None,
+    only: bool = False,
+    folder: Path | None = None,
     progress: Progress | None = None,
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
@@ -90,13 +100,19 @@ def campbell(
             as meet a branch in the range, at most 4.
         rated: rated speed, rad/s or with a unit such as "12.1 rpm"; that of the scene if None.
         operating: lowest and highest speed of operation, likewise.
+        only: whether to solve only these speeds: none is inserted where branches are ambiguous, and critical speeds
+            come from interpolation between them.
+        folder: where the modes of speeds that are finished are kept if it is interrupted, and taken from when the same
+            is asked for again; None to keep none.
         progress: called with the share of the speeds done, between 0 and 1.
         hint: called with every line of advice before the computation starts; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 
     Raises:
         SceneError: the scene or the speeds are not valid.
-        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
+        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check; its attribute `result` holds
+            the diagram of the speeds before it.
+        Stopped: it was interrupted; likewise.
     """
     marks: dict[str, Any] = {
         "modes.orders": list(range(1, orders + 1)) if isinstance(orders, int) else orders,
@@ -108,11 +124,13 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds)
     scene = scene.replace(marks) if marks else scene
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
-    values = parse_speeds(text, scene.limits)
+    values = parse_speeds(text)
 
     def compute(variant: Scene) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
-        return diagram(variant, analysis_of(variant, problem, comm), values, started, progress, hint)
+        analysis = analysis_of(variant, problem, comm)
+        kept = None if folder is None or analysis.comm.size > 1 else FinishedSpeeds(folder, variant)
+        return diagram(variant, analysis, values, started, progress, hint, only, kept)
 
     return answered(scene, compute, comm, "campbell")
 
@@ -124,6 +142,8 @@ def diagram(
     started: float,
     progress: Progress | None = None,
     hint: Hint | None = None,
+    only: bool = False,
+    kept: FinishedSpeeds | None = None,
 ) -> CampbellResult:
     """Return the branches over speed, with what the diagram says.
 
@@ -134,51 +154,67 @@ def diagram(
         started: `perf_counter()` at the start.
         progress: see `campbell`.
         hint: see `campbell`.
+        only: see `campbell`.
+        kept: speeds that are solved already.
+
+    Raises:
+        ComputationError: see `campbell`.
+        Stopped: see `campbell`.
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
-    reduced = in_basis(analysis, values, count + SPARE)
+    own, reduced = analysis, in_basis(analysis, values, count + SPARE)
     analysis = reduced or analysis
-    sweep = Sweep(analysis, count, scene.limits.speeds)
-    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if reduced is None:
-            sweep.known = solved_by_all(analysis, values, count, progress)
-        sweep.each = partial(shared_out, comm=analysis.everyone)
+    sweep = Sweep(analysis, count, only)
     if reduced is not None:
         sweep.known = dict(zip(values, reduced.at_all(values, count + SPARE), strict=True))
-    sweep.run(values, progress or (lambda share: None))
-    sweep.count = count = min(count, len(sweep.points[0].order))
-    found = [point.value(b).imag for point in sweep.points for b in range(count)]
-    lowest = min((w for w in found if w > 0), default=0.0)
-    orders = marks.orders
-    if orders is None:
-        most = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
-        orders = tuple(range(1, most + 1))
+        sweep.solves += len(values)
+    elif kept is not None:
+        sweep.known = kept.load(analysis)
+    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
+        if reduced is None:
+            left = [speed for speed in values if speed not in sweep.known]
+            sweep.known |= solved_by_all(analysis, left, count, progress)
+            sweep.solves += len(left)
+        sweep.each = partial(shared_out, comm=analysis.everyone)
+    stopped: ComputationError | KeyboardInterrupt | None = None
+    try:
+        sweep.run(values, progress or (lambda share: None))
+        orders, crossings, onsets = meetings(sweep, scene)
+    except (ComputationError, KeyboardInterrupt) as stop:
+        if isinstance(stop, KeyboardInterrupt) and not together(analysis.everyone, stop):
+            raise
+        if kept is not None:
+            kept.save(sweep.points)
+        if len(sweep.points) < 2:
+            raise
+        stopped, sweep.only, analysis.estimates = stop, True, False
+        orders, crossings, onsets = meetings(sweep, scene)
+    count = sweep.count
     labels = branch_labels(analysis, sweep, count)
-    mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
+    errors = branch_errors(scene, own, analysis, sweep, count) if analysis.estimates else None
+    mesh = None if errors is None else errors.each
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
-    crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
     for crossing in crossings:
-        label = labels[crossing["branch"] - 1]
-        crossing |= {"label": label, "name": engineers_name(label)}
+        crossing["label"] = labels[crossing["branch"] - 1]
     last = sweep.points[-1].spinning.first(count)
     of_last = {} if mesh is None else dict(zip(sweep.points[-1].order, mesh, strict=False))
     known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
-    off = theory_error(analysis, last)
     warnings = [
         *advice(analysis, fastest),
         *frozen_inputs(analysis.problem),
         *remarks(sweep, labels, onsets, mode_rows(analysis, last, known)),
-        *([off.warning()] if off and off.warning() else []),
+        *([] if stopped is None else [stopped_after(sweep, values, kept)]),
+        *([] if errors is None else warnings_of(errors, Setting.of(scene, moving=False), scene)),
     ]
     summary = {
-        **modal_summary("campbell", analysis, scene, started, off),
+        **modal_summary("campbell", analysis, scene, started),
+        **({} if stopped is None else {"status": "failed" if isinstance(stopped, ComputationError) else "interrupted"}),
         "branches": [
             {
                 "branch": b + 1,
                 "label": labels[b],
-                "name": engineers_name(labels[b]),
                 "confidence": min(float(point.confidence[b]) for point in sweep.points),
                 "frequency_first": _finite(sweep.points[0].value(b).imag),
                 "frequency_last": _finite(sweep.points[-1].value(b).imag),
@@ -193,15 +229,92 @@ def diagram(
         "instabilities": onsets,
         "ambiguous": sweep.ambiguous,
         "speeds": len(values),
+        "speeds_inserted": sweep.inserted,
         "speeds_solved": sweep.solves,
-        **({"error": error_of_modes(rows, off).summary()} if scene.output.error else {}),
+        **({} if errors is None else {"error": errors.summary()}),
         "checks": self_checks(analysis, sweep.points[-1].spinning),
         **analysis.report(),
-        "lowest_frequency": lowest,
+        "lowest_frequency": min((w for w in sweep.found() if w > 0), default=0.0),
         "warnings": warnings,
         "advice": hints,
     }
-    return CampbellResult(summary, rows)
+    result = CampbellResult(summary, rows)
+    if isinstance(stopped, ComputationError):
+        stopped.result = result
+        raise stopped
+    if stopped is not None:
+        raise Stopped(result) from stopped
+    if kept is not None:
+        kept.remove()
+    return result
+
+
+def meetings(sweep: Sweep, scene: Scene) -> tuple[tuple[int, ...], list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the orders k of the lines kΩ, critical speeds and ranges of instability."""
+    sweep.count = min(sweep.count, len(sweep.points[0].order))
+    orders = scene.modes.orders
+    if orders is None:
+        fastest = max(abs(point.speed) for point in sweep.points)
+        most = int(np.clip(np.ceil(max(sweep.found(), default=0.0) / max(fastest, 1e-300)), 1, 4))
+        orders = tuple(range(1, most + 1))
+    return orders, sweep.critical_speeds(orders), sweep.onsets()
+
+
+def stopped_after(sweep: Sweep, values: Sequence[float], kept: FinishedSpeeds | None) -> str:
+    """Return how far a diagram came that has not all its speeds."""
+    done = sum(point.requested for point in sweep.points)
+    goes_on = "" if kept is None else "; the same command goes on from there"
+    return f"{done} of {len(values)} speeds are finished, up to {speed_text(sweep.points[-1].speed)}{goes_on}"
+
+
+class FinishedSpeeds:
+    """The modes at speeds of a diagram that was interrupted, in a file of its result folder.
+
+    Args:
+        folder: the result folder.
+        scene: what they are of; modes of another scene, or of another version of rotfem, are not taken.
+    """
+
+    def __init__(self, folder: Path, scene: Scene):
+        self._path = folder / "speeds.npz"
+        self._key = hashlib.sha256(json_text([__version__, scene.to_dict()]).encode()).hexdigest()
+
+    def load(self, analysis: ModalAnalysis) -> dict[float, Spinning]:
+        """Return speed ↦ modes there; none where there is no file of this scene."""
+        try:
+            with np.load(self._path, allow_pickle=False) as file:
+                arrays = dict(file)
+        except (OSError, ValueError, EOFError, BadZipFile):
+            return {}
+        if str(arrays.pop("key", "")) != self._key:
+            return {}
+        out = {}
+        for i, speed in enumerate(arrays["speeds"].tolist()):
+            pairs = Eigenpairs(*(arrays[f"{name}_{i}"] for name in PAIRS))
+            out[speed] = analysis.restored(speed, arrays[f"q_{i}"], pairs, bool(arrays["rigid"][i]))
+        return out
+
+    def save(self, points: Sequence[SpeedPoint]) -> None:
+        """Keep the modes of some points, but for those whose rotations are counted from a deformed shape.
+
+        Raises:
+            OutputError: they cannot be written.
+        """
+        done = [point.spinning for point in points if point.spinning.reference is None]
+        if MPI.COMM_WORLD.rank > 0 or not done:
+            return
+        arrays: dict[str, Any] = {"key": self._key, "speeds": [s.speed for s in done], "rigid": [s.rigid for s in done]}
+        for i, s in enumerate(done):
+            arrays |= {f"q_{i}": s.q, **{f"{name}_{i}": getattr(s.pairs, name) for name in PAIRS}}
+        new = self._path.with_name(f".rotfem-{os.getpid()}.npz")
+        with writing(self._path):
+            np.savez(new, **arrays)
+            new.replace(self._path)
+
+    def remove(self) -> None:
+        """Remove the file of a diagram that is finished."""
+        if MPI.COMM_WORLD.rank == 0:
+            self._path.unlink(missing_ok=True)
 
 
 def solved_by_all(
@@ -231,22 +344,19 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
     last = sweep.points[-1]
     lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
     out = []
-    if sweep.unresolved:
-        out.append(
-            f"the branches change too fast to be followed: {sweep.solves} speeds were solved, and no more were added "
-            "between those asked for"
-        )
     out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
-        f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
+        f"ambiguous: {labels[int(a['branch']) - 1]} at {speed_text(a['speed'])}, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
     ]
     out += [
-        f"{onset['kind']} from {onset['speed']:.8g} rad/s "
-        + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
+        f"{onset['kind']} from {speed_text(onset['speed'], 8)} "
+        + ("on" if onset["until"] is None else f"to {speed_text(onset['until'], 8)}")
         for onset in onsets
     ]
-    return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *doubtful(ends))]
+    if sweep.only and not sweep.is_exact:
+        out.append("critical speeds and onsets of instability are interpolated between the speeds that were solved")
+    return out + [f"at {speed_text(last.speed)}, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
 
 def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:
@@ -266,15 +376,17 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
-    """Return the relative error of each branch by the mesh, the larger one of those at both ends of the diagram."""
-    errors, found = FrequencyErrors(analysis), list[list[float]]()
+def branch_errors(scene: Scene, analysis: ModalAnalysis, solved: ModalAnalysis, sweep: Sweep, count: int) -> Errors:
+    """Return the errors of the branches, the larger ones of those at both ends; `each` is that by the mesh."""
+    found, each = list[Errors](), list[list[float]]()
     for point in (sweep.points[0], sweep.points[-1]):
         order = [int(i) for i in point.order[:count]]
         # What the mesh does to modes far above would be taken for errors of these.
-        there = errors(point.spinning.first(1 + max(order)))
-        found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
-    return list(map(_finite, np.fmax(*np.array(found))))
+        found.append(modal_errors(scene, analysis, point.spinning.first(1 + max(order)), solved))
+        there = found[-1].each
+        each.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
+    worst = max(found, key=lambda errors: np.inf if errors.total is None else errors.total)
+    return replace(worst, each=list(map(_finite, np.fmax(*np.array(each)))))
 
 
 def point_rows(

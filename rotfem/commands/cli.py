@@ -25,21 +25,21 @@ def run(
         str | None, typer.Option("--checkpoint", metavar="EVERY", help="write checkpoints: every 30s, or 500 steps")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on from the checkpoint in the result folder")] = False,
+    error: Annotated[
+        str | None, typer.Option("--error", metavar="parts", help="errors of steps and mesh one by one")
+    ] = None,
 ) -> None:
     """Compute the steady state or the time history of SCENE."""
     from rotfem.commands.run import simulate
     from rotfem.commands.run_store import RunStore, interval
 
+    if error not in (None, "parts"):
+        raise SceneError("command line", "--error", error, 'must be "parts"')
     every = None if checkpoint is None else interval(checkpoint)
     store = RunStore(todo.session.comm, todo.results, every, resume)
-    if resume and (summary := store.finished(todo.scene)):
-        todo.session.print_json(summary)
-        todo.session.say(
-            [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
-        )
-        return
     hint = todo.hint if todo.scene.accuracy is None else todo.session.bar.says
-    todo.finish(simulate(todo.scene, store, todo.progress, hint))
+    shown, parts = todo.show, error is not None
+    todo.finish(simulate(todo.scene, store, todo.progress, hint, shown=shown, parts=parts))
 
 
 @command()
@@ -103,8 +103,14 @@ def campbell(
     operating: Annotated[
         str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range to mark: 6.9:12.1rpm")
     ] = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="solve no other speeds; critical speeds are interpolated between them")
+    ] = False,
 ) -> None:
-    """Compute the Campbell diagram and critical speeds of SCENE."""
+    """Compute the Campbell diagram and critical speeds of SCENE.
+
+    Of one that was interrupted the finished speeds are kept; the same command goes on from there.
+    """
     from rotfem.commands.campbell import campbell as sweep
 
     marks: dict[str, Any] = {
@@ -112,7 +118,8 @@ def campbell(
         "rated": None if rated is None else speeds_of("--rated", rated, 1)[0],
         "operating": None if operating is None else speeds_of("--operating", operating, 2),
     }
-    result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks, progress=todo.progress, hint=todo.hint)
+    marks |= {"only": only, "folder": todo.results.path, "progress": todo.progress, "hint": todo.hint}
+    result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks)
     todo.finish(result)
 
 

@@ -92,6 +92,7 @@ class Job:
         plots: whether figures are wanted.
         report: whether report.html is.
         hint: receives advice; None where none is wanted.
+        shown: whether the result has been written and printed, all but its error.
     """
 
     scene: Scene
@@ -100,10 +101,16 @@ class Job:
     plots: bool
     report: bool
     hint: Callable[[str], None] | None
+    shown: bool = False
 
     def progress(self, share: float) -> None:
         """Show which share of the computation is done."""
         self.session.bar(share)
+
+    def show(self, result: Result) -> None:
+        """Write and print a result whose error is still to be estimated."""
+        self.session.finish(result, self.plots, last=False)
+        self.shown = True
 
     def finish(self, result: Result, further: Sequence[Writer] = ()) -> None:
         """Write a result, what else is wanted, and report.html if that is; print its report."""
@@ -117,7 +124,10 @@ class Job:
                 with suppress(InputError, ComputationError):
                     drawing = check(self.scene, comm=self.session.comm).plot()
             writers.append(partial(write_report, result, drawing))
-        self.session.finish(result, self.plots, writers)
+        if self.shown:
+            self.session.complete(result, writers)
+        else:
+            self.session.finish(result, self.plots, writers)
 
 
 @contextmanager

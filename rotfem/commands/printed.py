@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotfem.refinement.estimate import error_line, percent
-from rotfem.refinement.refine import Setting
+from rotfem.accuracy.answer import Setting
+from rotfem.accuracy.errors import error_line, percent, table_lines
 from rotfem.results import Result
 from rotfem.results.columns import ShownUnits
 
@@ -21,8 +21,12 @@ def report(result: Result) -> list[str]:
     before, after = _AROUND[s["command"]](s)
     known = s.get("scene", {}).get("output", {}).get("error", True)
     unknown = [] if known else ["error: not estimated, as output.error = false"]
-    error = [error_line(s["error"])] if "error" in s else unknown
-    return [*before, *shared(s), *tables, *error, *after]
+    return [*before, *shared(s), *tables, *(of_error(s) if "error" in s else unknown), *after]
+
+
+def of_error(s: dict[str, Any]) -> list[str]:
+    """Return the lines about the error of a result, and what other accuracies cost."""
+    return ([error_line(s["error"])] if "error" in s else []) + table_lines(s.get("settings", []))
 
 
 def shared(s: dict[str, Any]) -> list[str]:
@@ -53,19 +57,12 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 
 def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `campbell` prints before and after its tables."""
+    inserted = f", {s['speeds_inserted']} inserted to follow the modes" * bool(s["speeds_inserted"])
     line = (
-        f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds ({s['speeds_solved']} solved to follow the modes), "
+        f"{s['name']}: {s['theory']} theory, {s['speeds']} speeds{inserted}, "
         f"{s['dofs']} unknowns, in {s['timings']['total']:.2f} s"
     )
     return [line, *accuracy_report(s)], []
-
-
-def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
-    """Return what `response` prints before and after its table."""
-    off, modes = s["difference"], len(s["modes"])
-    sizes = f"{percent(off['median'])} at half of the frequencies, {percent(off['largest'])} at most"
-    after = f"difference to the response by {modes} modes: {sizes}"
-    return [about(s), f"{s['frequencies']} frequencies of the load"], [after]
 
 
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
@@ -89,7 +86,7 @@ _AROUND = {
     "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
     "modes": lambda s: ([about(s), effects(s), *accuracy_report(s)], []),
     "campbell": of_campbell,
-    "response": of_response,
+    "response": lambda s: ([about(s), f"{s['frequencies']} frequencies of the load"], []),
     "explain": of_explain,
     "compare": lambda s: ([], [f"largest difference: {percent(s['worst'])}"]),
     "sweep": of_sweep,
@@ -118,4 +115,4 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
     met = "met" if wanted["met"] else "not met"
     tries = len(wanted["attempts"])
     attempts = "" if tries == 1 else f" after {tries} attempts"
-    return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {Setting.of(wanted['chosen']).words()}"]
+    return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {Setting.read(wanted['chosen']).words()}"]

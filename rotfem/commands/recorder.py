@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.conditioning import Farthest
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
-from rotfem.analysis.theory_error import Farthest
 from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations
 from rotfem.errors import ComputationError, InputError
+from rotfem.listeners import computing
 from rotfem.mechanics.theories import Theory, richest, theories
 from rotfem.results.run import RunResult, StationHistory, Table
 from rotfem.scene.settings import OutputTable
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -32,16 +34,20 @@ class Log:
     """What a run counts and has to say.
 
     Attributes:
-        started: `perf_counter()` then, s.
+        started, began: `perf_counter()` then, and CPU time without compilation, s.
         steps: number of the last step.
-        elapsed: time that it had taken before it went on from a checkpoint, s.
+        parts: steps that were taken, parts of steps counted each.
+        elapsed, cpu: time and CPU time that it had taken before it went on from a checkpoint, s.
         warnings, advice: texts.
         resumed: time (s) and number of ranks of every checkpoint that it went on from.
     """
 
     started: float = field(default_factory=perf_counter)
+    began: float = field(default_factory=computing)
     steps: int = 0
+    parts: int = 0
     elapsed: float = 0.0
+    cpu: float = 0.0
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     resumed: list[dict[str, Any]] = field(default_factory=list)
@@ -85,8 +91,8 @@ class Monitor:
         why = "the motion is unstable, or the load is too large for a linear theory"
         if loose:
             why = f"no spring holds the root's hinge ({', '.join(loose)}), which turns beyond what is linear"
-        if self.since is not None:
-            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self.since:.4g} s"
+        if self.since is not None and self.critical is not None:
+            why = f"its stiffness is not definite above {speed_text(self.critical)}, passed at t = {self.since:.4g} s"
             if not theory.prestress:
                 why += ": first-order strains have the softening by the centrifugal force but not the stiffening"
         what = f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})"
@@ -120,7 +126,7 @@ def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, w
 def check_rows(rows: Iterable[Mapping[str, Any]]) -> None:
     """See that all numbers of modes, or of branches over speed, are finite."""
     for number, row in enumerate(rows, start=1):
-        where = f" at {row['speed']:g} rad/s" if "speed" in row else ""
+        where = f" at {speed_text(row['speed'])}" if "speed" in row else ""
         check_finite(row.items(), where=f" of mode {row.get('branch', number)}{where}")
 
 

@@ -6,6 +6,7 @@ A run is the compiled system, what yields its states, the observers that see the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,18 +15,16 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.accuracy.answer import Series
-from rotfem.accuracy.outputs import OUTPUTS, of_columns, output_of
+from rotfem.accuracy.answer import Answer, Answers, Setting
+from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
-from rotfem.analysis.theory_error import said_of
-from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.error_report import RunErrors
+from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, error_of, to_accuracy, with_error
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
@@ -34,16 +33,17 @@ from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
-from rotfem.listeners import Hint, Progress, silent
+from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.refine import Clock, Setting
+from rotfem.results.distance import Series
 from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.structures.symmetry import inactive_unknowns
+from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +61,6 @@ class Simulation:
         scene: the scene as it was asked for.
         problem: its problem, with the model it is run with.
         store: what is kept of it on disk while it goes on, and the processes that run it.
-        setting: of the refinement that it is an answer of, if it is.
         clock: called with the number of steps and the part of the history that is done.
         times: rows (s) at which the output alone is wanted, to be compared, and the rest when `result` asks for it;
             None for the rows of the scene, each with all that a history has.
@@ -72,11 +71,10 @@ class Simulation:
         scene: Scene,
         problem: ProblemData,
         store: RunStore,
-        setting: Setting | None = None,
         clock: Callable[[int, float], None] | None = None,
         times: Array | None = None,
     ):
-        self.scene, self.setting, self.clock, self.times = scene, setting, clock, times
+        self.scene, self.clock, self.times = scene, clock, times
         self.comm, self.store, self.log = store.comm, store, Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
@@ -99,7 +97,6 @@ class Simulation:
         self.last: State | None = None
         self.shape: Array | None = None
         #: Legs of all steps; the output at the rows so far, and states of rows whose other values wait to be asked for.
-        self.steps = 0
         self._output = OUTPUTS[output_of(scene)]
         self._values = list[Array]()
         self._waiting = list[State]()
@@ -111,6 +108,27 @@ class Simulation:
             return Series(self.times[: len(self._values)], np.array(self._values))
         history = self.record.history.arrays()
         return Series(history["t"], of_columns(output_of(self.scene), history, self.system.structure))
+
+    @property
+    def steps(self) -> int:
+        """Number of steps that were taken, parts of steps counted each."""
+        return self.log.parts
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the equilibrium is stable; None of a history."""
+        known = self.monitor.stability if self.scene.time is None else None
+        return None if known is None else known.stable
+
+    @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of the vertices of the mesh along each axis."""
+        return lines(self.system)
+
+    @property
+    def round_off(self) -> None:
+        """There is no bound of the error by round-off; a warning says where it is large."""
+        return None
 
     def compute(self) -> Simulation:
         """Compute the output at the rows, and nothing else; return this.
@@ -172,16 +190,16 @@ class Simulation:
         system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
         log.warnings += frozen_inputs(self.problem)
         self.shape = steady_state(system, speed, self.iteration, notes=log.warnings)
+        stability = self.monitor.stability = stability_of(system, self.shape, speed)
         if self.times is not None:
             self._sampled(State.at_rest(system, *system.start(self.shape)))
             return
-        stability = self.monitor.stability = stability_of(system, self.shape, speed)
         self._recorded(State.at_rest(system, *system.start(self.shape)))
         critical = self.monitor.critical
         if said := stability.warning():
             if critical is not None and abs(speed) > critical:
                 said += (
-                    f"; {abs(speed):g} rad/s is above the speed {critical:.6g} rad/s at which the "
+                    f"; {speed_text(abs(speed))} is above the speed {speed_text(critical)} at which the "
                     f"{self.problem.theory.name} stiffness is singular"
                 )
             log.warnings.append(said)
@@ -212,7 +230,7 @@ class Simulation:
     # --- what sees them ---------------------------------------------------------------------------------------------
 
     def _leg(self, old: State, new: State) -> None:
-        self.steps += 1
+        self.log.parts += 1
 
     def _sampled(self, state: State) -> None:
         """Take the output of a row; the rest of it waits."""
@@ -222,8 +240,6 @@ class Simulation:
     def _stepped(self, state: State, time: Time, progress: Progress) -> None:
         """Show a state of the march to all that observe it."""
         steps = self.log.steps
-        if (why := self.scene.limits.refusal("steps", steps)) is not None:
-            raise ComputationError(f"the motion {why}", time=state.t)
         self.monitor.step(state)
         self.last = state
         rows = [state]
@@ -245,7 +261,7 @@ class Simulation:
     def _memory(self) -> Memory:
         """Return what a checkpoint holds."""
         assert self.scene.time is not None
-        return Memory(self.scene.time, self.system, self.march, self.record, self.monitor, self.log, self.setting)
+        return Memory(self.scene.time, self.system, self.march, self.record, self.monitor, self.log)
 
     # --- the result -------------------------------------------------------------------------------------------------
 
@@ -256,25 +272,16 @@ class Simulation:
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
         watched = self.monitor
-        if status == "done" and watched.since is not None:
+        if status == "done" and watched.since is not None and watched.critical is not None:
             log.warnings.append(
-                f"the speed is above {watched.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is "
+                f"the speed is above {speed_text(watched.critical)}, where the {self.problem.theory.name} stiffness is "
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
-        errors = RunErrors(
-            *(self.scene, self.system, history, self._wants_error, watched),
-            *(self.shape, self.march, self._start),
-        )
-        theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
-        log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
-        error = None if failure is not None else errors.estimate()
-        log.warnings += [] if error is None else errors.warnings(error)
+        log.warnings += [lost] if (lost := watched.farthest.warning()) else []
         found = self._summary(status, history) | {
             name: part.summary()
             for name, part in (
                 ("stress", self.record.resultants),
-                ("error", error),
-                ("theory_error", theory),
                 ("stability", watched.stability),
             )
             if part is not None
@@ -294,10 +301,6 @@ class Simulation:
             return ComputationError(what, error.time, SMOOTHER)
         return error
 
-    @property
-    def _wants_error(self) -> bool:
-        return self.scene.output.error or self.setting is not None
-
     def _summary(self, status: str, history: dict[str, Array]) -> dict[str, Any]:
         """Return what was computed and how it went."""
         scene, system, log, march = self.scene, self.system, self.log, self.march
@@ -311,7 +314,6 @@ class Simulation:
             "theory": self.problem.theory.name,
             "frame": self.problem.frame,
             "effects": list(system.model.effects),
-            "integrals": system.integrals,
             "dofs": space.index_map.size_global * space.index_map_bs,
             "elements": mesh.topology.index_map(mesh.topology.dim).size_global,
             "steps": log.steps,
@@ -348,6 +350,7 @@ def run(
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
+    parts: bool = False,
     folder: str | Path | None = None,
     checkpoint: str | int | None = None,
     resume: bool = False,
@@ -362,6 +365,7 @@ def run(
             long; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
         outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
+        parts: estimate the errors of steps and mesh one by one, which takes two more answers in the place of one.
         folder: where the results go, the history as it grows, all of them but figures at the end; None writes nothing.
         checkpoint: how often checkpoints are written there: after "30s", or after 500 steps; never if None.
         resume: go on from the checkpoint that is there.
@@ -374,10 +378,10 @@ def run(
     scene = as_scene(scene)
     every = None if checkpoint is None else interval(checkpoint)
     if folder is None:
-        return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs)
+        return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs, parts=parts)
     with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
         try:
-            done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs)
+            done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
             if error.result is not None:
                 results.write(error.result, plots=False)
@@ -395,30 +399,57 @@ def simulate(
     hint: Hint | None,
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
+    shown: Callable[[RunResult], object] = lambda result: None,
+    parts: bool = False,
 ) -> RunResult:
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
 
+    `shown` takes the result before its error is estimated.
+
     Raises:
         Missed: its accuracy was not met.
-        ComputationError: the richest model failed.
+        ComputationError: it failed.
     """
-    clock = Clock(scene.accuracy_budget, store.comm, hint)
+    comm, clock = store.comm, clock_of(scene, store.comm, hint)
     scene.check_run()
     store.open(scene, terms or {}, outputs or {})
 
-    def compute(setting: Setting | None = None) -> RunResult:
-        variant = scene if setting is None else scene.replace(changes_of(scene, setting))
+    def compute(variant: Scene, times: Array | None) -> Simulation:
+        rows = rows_of(variant) if times is None else times
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        simulation = Simulation(variant, problem, store, setting, clock)
-        if scene.accuracy is None:
-            also, critical = hints_of_start(variant, simulation.problem), simulation.monitor.critical
-            simulation.log.advice = advise(variant, hint, critical=critical, also=also)
-        return simulation.run(progress)
+        return Simulation(variant, problem, RunStore(comm), clock, rows).compute()
 
+    answers = Answers(scene, compute)
     with input_of(scene.file):
         if scene.time is None:
             check_steady(Problem.of(scene, terms=terms, outputs=outputs))
         if scene.accuracy is not None:
-            refuse(scene, ("tip", ROOT_MOMENT), "run")
-            return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
-        return compute()
+            check_of(scene, ("tip", ROOT_MOMENT), "run")
+            answers.times = rows_of(scene)
+            done: RunResult = to_accuracy(answers, output_of(scene), clock, comm, lambda result, errors: result)
+            return done
+        simulation = Simulation(scene, Problem.of(scene, terms=terms, outputs=outputs), store)
+        also, critical = hints_of_start(scene, simulation.problem), simulation.monitor.critical
+        simulation.log.advice = advise(scene, hint, critical=critical, also=also)
+        result = simulation.run(progress)
+        if not scene.output.error:
+            return result
+        degree, log = simulation.system.V.element.basix_element.degree, simulation.log  # a default differs by cell
+        own = Answer(replace(Setting.of(scene), degree=degree), simulation, log.cpu + computing() - log.began)
+        answers.keep(own)
+        shown(result)
+        started = perf_counter()
+        return with_error(result, error_of(answers, own, comm, parts), own, scene, started)
+
+
+#: Rows of a history that does not say it.
+ROWS = 1000
+
+
+def rows_of(scene: Scene) -> Array:
+    """Return the times (s) of the rows that a scene asks for; 0 of a steady state."""
+    time = scene.time
+    if time is None:
+        return np.zeros(1)
+    step = time.output_step or (time.step and time.step * time.output_every) or time.end / ROWS
+    return multiples(step, time.end)

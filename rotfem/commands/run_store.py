@@ -25,18 +25,22 @@ from rotfem.analysis.schemes import State
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import SceneError, Stopped
+from rotfem.listeners import computing
 from rotfem.results.checkpoint_file import checkpoint_of, read_checkpoint, write_checkpoint
-from rotfem.results.result_set import CHECKPOINT, LiveTable, ResultFolder, read_summary
+from rotfem.results.result_set import CHECKPOINT, LiveTable, ResultFolder
 from rotfem.scene import Scene, Time
 from rotfem.version import versions
 
 Tree = dict[str, Any]
 
+#: Steps between two talks of ranks that each compute all of a small system: some 50 ms.
+SELDOM = 50
+
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
-    "log": ("steps", "warnings", "resumed"),
+    "log": ("steps", "parts", "warnings", "resumed"),
     "monitor": ("since", "stability"),
-    "monitor.farthest": ("seen", "first"),
+    "monitor.farthest": ("seen",),
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
@@ -48,11 +52,7 @@ REMEMBERED = {
 
 @dataclass
 class Memory:
-    """The parts of a run that a checkpoint is of; without a march nothing can be kept.
-
-    Attributes:
-        setting: of the accuracy that the run is an answer for; None without one.
-    """
+    """The parts of a run that a checkpoint is of; without a march nothing can be kept."""
 
     time: Time
     system: Any
@@ -60,7 +60,6 @@ class Memory:
     record: Recorder
     monitor: Monitor
     log: Log
-    setting: Any = None
 
     def parts(self) -> dict[str, Any]:
         """Return the parts of `REMEMBERED` that there are, by name."""
@@ -68,12 +67,7 @@ class Memory:
         return {name: part for name, part in found.items() if part is not None}
 
     def taken(self, state: State, identity: Tree) -> Tree:
-        """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0.
-
-        Args:
-            state: at the end of the last step.
-            identity: of the run.
-        """
+        """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
         own = {
             "positions": self.system.V.tabulate_dof_coordinates(),
             "state": state,
@@ -86,17 +80,13 @@ class Memory:
             "versions": versions(),
             "t": state.t,
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
+            "cpu": self.log.cpu + computing() - self.log.began,
             "rows": np.array(self.record.history.rows()).reshape(len(self.record.history), -1),
-            "setting": self.setting,
             "processes": self.system.comm.gather(own),
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:
-        """Make the run know what a checkpoint says; return the state to go on from.
-
-        Raises:
-            SceneError: the mesh is another one, or other processes share it.
-        """
+        """Make the run know what a checkpoint says; return the state to go on from."""
         comm, here, ranks = self.system.comm, self.system.V.tabulate_dof_coordinates(), len(tree["processes"])
         if ranks != comm.size:
             why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
@@ -110,7 +100,7 @@ class Memory:
             vars(part).update(own["parts"][name])
         for row in tree["rows"]:
             self.record.history.append(row)
-        self.log.elapsed = tree["elapsed"]
+        self.log.elapsed, self.log.cpu = tree["elapsed"], tree["cpu"]
         state: State = own["state"]
         self.log.resumed.append({"time": state.t, "ranks": comm.size})
         self.system.count_rotations_from(state.reference)
@@ -122,18 +112,13 @@ class Memory:
 
 
 def identity_of(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> Tree:
-    """Return all that a run depends on, but for its end: scene, content of a mesh file, names of what scripts added."""
+    """Return what a run depends on, but for its end: scene, content of a mesh file, names of what scripts added."""
     mesh = scene.structure.mesh_file
     content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
-    tables = comparable(scene.digest())
+    tables: Tree = json.loads(json.dumps(scene.digest(), default=str))
     tables.get("time", {}).pop("end", None)
+    tables.pop("name", None)
     return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
-
-
-def comparable(scene: Any) -> Any:
-    """Return the tables of a scene as a file has them, without those that nothing computed depends on."""
-    tables = json.loads(json.dumps(scene, default=str))
-    return {k: v for k, v in tables.items() if k not in ("name", "limits")} if isinstance(tables, dict) else tables
 
 
 def differences(there: Any, here: Any, key: str = "") -> list[str]:
@@ -148,11 +133,7 @@ def differences(there: Any, here: Any, key: str = "") -> list[str]:
 
 
 def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
-    """Refuse a checkpoint of another run, or one that lies after an end (s).
-
-    Raises:
-        SceneError: it is of another scene, or of another version of the program; says what differs.
-    """
+    """Refuse a checkpoint of another run, or one that lies after an end (s)."""
     why, (there, here) = "", (tree["versions"]["rotfem"], versions()["rotfem"])
     if there != here:
         why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
@@ -205,34 +186,21 @@ class RunStore:
         self._identity: Tree = {}
         self._interrupts = Interrupts(comm.size == 1)
         self._written = monotonic()
-        #: Time (s) and step at which ranks last talked to each other, and the step at which they do so next.
-        self._talked, self._next = (monotonic(), 0), 0
 
     @property
     def goes_on(self) -> bool:
         """Whether there is a checkpoint to go on from."""
         return self._tree is not None
 
-    def setting(self) -> Any:
-        """Return the setting of the run that goes on, which an accuracy has led to; None without."""
-        return None if self._tree is None else self._tree["setting"]
-
     def open(self, scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> None:
-        """Read the checkpoint that the run is to go on from, and see that it is one of this run.
-
-        Args:
-            scene: what is run.
-            terms: terms that a script adds.
-            outputs: outputs that it asks for.
-
-        Raises:
-            SceneError: there is none, or it is damaged, or of another run; or there is nothing to go on with.
-        """
+        """Read the checkpoint to go on from, if one is; refuse that of another run, and runs that have none."""
         if self.every is None and not self.resume:
             return
         option = "--resume" if self.resume else "--checkpoint"
         if scene.time is None:
             raise SceneError("command line", option, None, "needs a scene with [time]; a steady state has no steps")
+        if scene.accuracy is not None:
+            raise SceneError("command line", option, None, "cannot be combined with accuracy: it takes several answers")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
         self._identity, path, end = identity_of(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
@@ -247,27 +215,13 @@ class RunStore:
             self._tree = self.folder.first_does(read)
             self.every = self.every or self._tree["every"]
 
-    def finished(self, scene: Scene) -> Tree | None:
-        """Return the summary in the folder if it is that of this run, done; None otherwise."""
-        folder = self.folder
-        if folder is None:
-            return None
-        summary = folder.first_does(lambda: read_summary(folder.path))
-        is_done = summary.get("command") == "run" and summary.get("status") == "done"
-        return summary if is_done and comparable(summary.get("scene")) == comparable(scene.digest()) else None
-
     def interrupts(self) -> Interrupts:
         """Return the context in which a march is interrupted between steps."""
         return self._interrupts
 
     def start(self, run: Memory) -> State | None:
-        """Begin the results of a run; return the state that it goes on from, if it does.
-
-        Raises:
-            OutputError: the folder cannot be written.
-            SceneError: the checkpoint does not fit.
-        """
-        self._run, self._talked, self._next = run, (monotonic(), run.log.steps), 0
+        """Begin the results of a run; return the state of the checkpoint that it goes on from, None without."""
+        self._run = run
         folder, tree, state = self.folder, self._tree, None
         if folder is None:
             return None
@@ -281,16 +235,11 @@ class RunStore:
         return state
 
     def stepped(self, state: State) -> None:
-        """Take note of the end of a step.
-
-        Raises:
-            Stopped: a signal has asked one of the ranks to end.
-            OutputError: a checkpoint cannot be written.
-        """
+        """Take note of the end of a step; raise `Stopped` where a signal has asked one of the ranks to end."""
         assert self._run is not None
         if self._live is not None:
             self._live.update()
-        (asked, due), time = self._agreed(), self._run.time
+        (asked, due), time = self._agreed(self._run), self._run.time
         left = (time.end - state.t) / (time.step or 1e-9 * time.end)  # steps at least; of adaptive ones if there is one
         # The last state that a run with a later end would have met, too, is kept; none after it.
         if left >= 1 - 1e-6 and (asked or due or (time.step is not None and left < 2 - 1e-6)):
@@ -300,24 +249,19 @@ class RunStore:
                 self.folder.first_does(self._secure)
             raise Stopped
 
-    def _agreed(self) -> tuple[bool, bool]:
+    def _agreed(self, run: Memory) -> tuple[bool, bool]:
         """Return whether a signal has come to one of the ranks, and whether a checkpoint is due, the same on all.
 
-        Ranks talk to each other after so many steps only as take about 50 ms on rank 0, as mpirun gives its processes a
-        quarter of a second to end: they need not meet in between.
+        Ranks that share a mesh talk to each other after every step, others, whose steps are quick, seldom.
         """
-        asked, every = self._interrupts.asked, self.every
-        steps = 0 if self._run is None else self._run.log.steps
+        asked, every, steps = self._interrupts.asked, self.every, run.log.steps
         due = isinstance(every, int) and steps > 0 and steps % every == 0
-        if self.comm.size > 1 and steps < self._next:
-            return False, due
         late = isinstance(every, float) and steps > 0 and monotonic() - self._written >= every
         if self.comm.size > 1:
-            now = monotonic()
-            pace, self._talked = (now - self._talked[0]) / max(1, steps - self._talked[1]), (now, steps)
-            told = self.comm.allgather((asked, late, pace))
-            asked, (_, late, pace) = any(rank[0] for rank in told), told[0]
-            self._next = steps + max(1, int(0.05 / max(pace, 1e-9)))
+            if run.system.comm.size == 1 and steps % SELDOM:
+                return False, due
+            told = self.comm.allgather((asked, late))
+            asked, late = any(rank[0] for rank in told), told[0][1]
         return asked, due or late
 
     def _secure(self) -> None:

@@ -119,7 +119,7 @@ class Case:
         analysis = ModalAnalysis(system.model.problem, self.about, self.newton(), system.comm, system)
         spinning = with_plain_tangents(system, lambda: analysis.at(speed, self.mode_count))
         names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
-        lasting = [not name.endswith(", fast") for name in names]  # overdamped ones have two eigenvalues
+        lasting = [name.rest != "fast" for name in names]  # overdamped ones have two eigenvalues
         return np.asarray(spinning.pairs.resolved[: len(names)][lasting])
 
 

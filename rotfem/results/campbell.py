@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import ShortTable, ShownUnits, number, numbers
-from rotfem.results.files import json_text, rows_text
-from rotfem.results.result import Array, Rows, Variables
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
+from rotfem.results.files import json_text
+from rotfem.results.result import Array, OfTable, Rows
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,6 @@ class CriticalSpeed:
         per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
         frequency: of the branch there, in the rotating frame, kΩ, rad/s.
         label: of the branch.
-        name: what an engineer calls it, as "1st flapwise".
     """
 
     speed: float
@@ -35,7 +34,6 @@ class CriticalSpeed:
     per_rev: int
     frequency: float
     label: str
-    name: str
 
 
 @dataclass(frozen=True)
@@ -68,6 +66,13 @@ class CampbellResult(Rows):
     """
 
     index = ("speed", "label")
+    frequencies = OfTable(
+        "frequency",
+        "Frequencies in the rotating frame, (speeds, branches), rad/s; NaN where a branch is lost. With supports that "
+        "differ by direction they are those in the fixed frame.",
+    )
+    damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (speeds, branches); NaN where a branch is lost.")
+    growth = OfTable("growth", "Growth Re λ, (speeds, branches), 1/s; NaN where a branch is lost.")
 
     @property
     def labels(self) -> list[str]:
@@ -85,24 +90,6 @@ class CampbellResult(Rows):
         return np.array(list(self._refined().values()), dtype=bool)
 
     @property
-    def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost.
-
-        With supports that differ by direction they are those in the fixed frame.
-        """
-        return self.column("frequency")
-
-    @property
-    def damping(self) -> Array:
-        """Damping ratios −Re λ/|λ|, shape (speeds, branches); NaN where a branch is lost."""
-        return self.column("damping")
-
-    @property
-    def growth(self) -> Array:
-        """Growth Re λ, shape (speeds, branches), 1/s; NaN where a branch is lost."""
-        return self.column("growth")
-
-    @property
     def critical_speeds(self) -> list[CriticalSpeed]:
         """Critical speeds: the synchronous ones of a rotor by increasing speed, then where branches meet kΩ."""
         return [CriticalSpeed(**crossing) for crossing in self.summary["critical_speeds"]]
@@ -115,38 +102,19 @@ class CampbellResult(Rows):
     def _refined(self) -> dict[float, bool]:
         return {row["speed"]: bool(row["refined"]) for row in self.rows}
 
-    def _numbers(self) -> list[str]:
-        own = ("speed", "branch", "refined")
-        return [k for k, v in self.rows[0].items() if isinstance(v, int | float) and k not in own]
-
-    def column(self, name: str) -> Array:
-        """Return a number of every mode, such as `residual`, shape (speeds, branches), NaN where a branch is lost.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        if name not in self._numbers():
-            raise KeyError(f"no number {name!r} of the branches; there are {', '.join(self._numbers())}")
-        place = {speed: i for i, speed in enumerate(self._refined())}
-        out = np.full((len(place), len(self.labels)), np.nan)
-        for row in self.rows:
-            out[place[row["speed"]], row["branch"] - 1] = row[name]
-        return out
-
     def branches(self) -> dict[str, dict[str, Array]]:
-        """Return label ↦ columns `speed`, `frequency`, `growth`, … over all speeds solved."""
+        """Return label ↦ columns `speed`, `frequency`, `growth`, … over the speeds at which the branch was found."""
         out: dict[str, dict[str, Array]] = {}
         for label in dict.fromkeys(row["label"] for row in self.rows):
-            mine = [row for row in self.rows if row["label"] == label]
-            numbers = [k for k, v in mine[0].items() if isinstance(v, int | float)]
-            out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
+            mine = Columns.of_rows([row for row in self.rows if row["label"] == label])
+            out[label] = {name: mine.array(name).astype(np.float64) for name in mine.numbers}
         return out
 
     def texts(self) -> dict[str, str]:
         """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
-            "campbell.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
+            **super().texts(),
             "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
         }
 
@@ -167,7 +135,7 @@ class CampbellResult(Rows):
 
         columns = [
             [str(b["branch"]) for b in branches],
-            [b["name"] for b in branches],
+            [b["label"] for b in branches],
             frequencies("frequency_first"),
             frequencies("frequency_last"),
             [f"{b['confidence']:.3f}" for b in branches],
@@ -176,18 +144,9 @@ class CampbellResult(Rows):
         head = ("branch", "name", first, last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
-            what = f"{c.name} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.name}, synchronous"
+            what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"
             critical.append((number(float(units.speeds(c.speed)), digits=8), what))
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:
             out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
         return out
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
-
-        NaN where a branch is lost; `refined` marks the speeds that were not asked for.
-        """
-        coordinates: Variables = {"speed": (("speed",), self.speeds), "refined": (("speed",), self.refined)}
-        coordinates["branch"] = ("branch",), np.array(self.labels, dtype=str)
-        return {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}, coordinates

@@ -1,4 +1,4 @@
-"""What the columns of results are, their units and numbers as text, and short tables of them.
+"""Columns of results: what they are, their units, what is made of them, numbers as text, and short tables.
 
 Speeds and frequencies are printed and drawn in the units that a scene asks for. Files have SI units, and those of modes
 these units too.
@@ -10,14 +10,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
+from pathlib import Path
 from textwrap import wrap
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.registry import outputs
+from rotfem.results.files import csv_text, whole_hdf5
 from rotfem.units import quantity
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 Array = npt.NDArray[np.float64]
 
@@ -111,6 +117,8 @@ def described(column: str) -> tuple[str, str]:
     if column.startswith("tip_") and column[4:].rstrip("123") in ("u", "alpha", "theta"):
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
+    if column.endswith("_phase"):
+        return f"phase of {described(column.removesuffix('_phase'))[0]}", "rad"
     if column.startswith("shape_"):
         what, unit = described(column.removeprefix("shape_"))
         return f"shape, {what}{' × length' if unit == 'rad' else ''}", "1"
@@ -139,6 +147,108 @@ def shown_unit(column: str, shown: str = "") -> str:
     """Return the unit of a column, or the one that it is shown in, as "(m)"; "" of one without."""
     unit = shown or described(column)[1]
     return f"({'–' if unit == '1' else unit})" if unit else ""
+
+
+# --- columns of a result ----------------------------------------------------------------------------------------------
+
+#: Name of a labelled array ↦ its dimensions and values.
+Variables = dict[str, tuple[tuple[str, ...], npt.NDArray[Any]]]
+
+#: What says where the others are, in labelled arrays.
+COORDINATES = ("x", "y", "triangles", "label")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Named columns of equal length, of which files, tables of pandas and labelled arrays are made.
+
+    Attributes:
+        values: name ↦ value of every row; None where a row has none.
+        index: names of the columns that label the rows. Rows with two labels or more are places of a grid.
+        dimension: name of the rows where nothing labels them.
+    """
+
+    values: Mapping[str, Sequence[Any] | npt.NDArray[Any]]
+    index: tuple[str, ...] = ()
+    dimension: str = "row"
+
+    @classmethod
+    def of_rows(cls, rows: Sequence[Mapping[str, Any]], index: tuple[str, ...] = (), dimension: str = "row") -> Self:
+        """Return the columns of rows, each with name ↦ value."""
+        names = dict.fromkeys(name for row in rows for name in row)
+        return cls({name: [row.get(name) for row in rows] for name in names}, index, dimension)
+
+    def array(self, name: str) -> npt.NDArray[Any]:
+        """Return a column: truth values, text, or numbers; "" or NaN stand for what is absent."""
+        values = self.values[name]
+        if isinstance(values, np.ndarray):
+            return values
+        if any(isinstance(value, str | list) for value in values):
+            return np.array(["" if value is None else str(value) for value in values])
+        return np.array([np.nan if value is None else value for value in values])
+
+    @property
+    def numbers(self) -> list[str]:
+        """Names of the columns that hold numbers."""
+        return [name for name in self.values if self.array(name).dtype.kind in "bif"]
+
+    def grid(self, name: str) -> tuple[tuple[str, ...], npt.NDArray[Any]]:
+        """Return the dimensions and the values of a column: over `index` where it labels the rows, else over these.
+
+        "" or NaN stand for places of a grid without a row.
+        """
+        values = self.array(name)
+        if len(self.index) < 2:
+            return self.index or (self.dimension,), values
+        labels = [self.array(label).tolist() for label in self.index]
+        orders = [{label: i for i, label in enumerate(dict.fromkeys(column))} for column in labels]
+        shape = tuple(map(len, orders))
+        whole = np.prod(shape) == len(values) or values.dtype.kind in "US"
+        out = np.zeros(shape, values.dtype) if whole else np.full(shape, np.nan)
+        out[tuple([order[label] for label in column] for order, column in zip(orders, labels, strict=True))] = values
+        return self.index, out
+
+    def variables(self) -> Variables:
+        """Return all columns over their dimensions, the labels of these first."""
+        labels: Variables = {name: ((name,), self.array(name)) for name in self.index}
+        if len(self.index) > 1:
+            labels = {n: (of, np.array(list(dict.fromkeys(values.tolist())))) for n, (of, values) in labels.items()}
+        return labels | {name: self.grid(name) for name in self.values if name not in self.index}
+
+    def csv(self) -> str:
+        """Return the columns as CSV with a header; numbers keep all their digits, what is absent stays empty."""
+        return csv_text(self.values)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the columns as a table labelled by `index`; what is absent is NaN."""
+        import pandas
+
+        table = pandas.DataFrame(dict(self.values))
+        return table.set_index(list(self.index)) if self.index and not table.empty else table
+
+    def write_hdf5(self, path: Path) -> Path:
+        """Write the columns as HDF5 datasets over their dimensions, with their units; return the path.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        with whole_hdf5(path) as file:
+            for name, (_, values) in self.variables().items():
+                data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
+                data.attrs["long_name"], data.attrs["units"] = described(name)
+        return path
+
+
+def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """Return variables as labelled arrays, each with its `long_name` and `units` as far as they are known."""
+    import xarray
+
+    out = xarray.Dataset(variables, attrs=dict(attributes))
+    out = out.set_coords([name for name in COORDINATES if name in out])
+    for name, array in out.variables.items():
+        what, unit = described(str(name))
+        array.attrs |= {"long_name": what, "units": unit} if unit else {}
+    return out
 
 
 # --- the units that are shown -----------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -48,27 +48,19 @@ def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
         return f"nothing can be written in {path.parent}: {error.strerror or error}"
 
 
-def csv_text(columns: dict[str, Array]) -> str:
-    """Return columns as CSV with a header; numbers keep all their digits."""
+def csv_text(columns: Mapping[str, npt.ArrayLike | Sequence[Any]]) -> str:
+    """Return columns as CSV with a header; numbers keep all their digits, what is absent (None) stays empty."""
     buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(columns)
-    buffer.writelines(map(line, zip(*columns.values(), strict=True)))
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    plain = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    writer.writerows(zip(*plain, strict=True))
     return buffer.getvalue()
 
 
 def line(row: Iterable[float]) -> str:
     """Return numbers as a line of CSV, with all their digits."""
     return ",".join([repr(float(value)) for value in row]) + "\n"
-
-
-def rows_text(rows: list[dict[str, Any]]) -> str:
-    """Return rows of named values as CSV with a header; numbers keep all their digits, what is absent stays empty."""
-    buffer = io.StringIO()
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    writer = csv.DictWriter(buffer, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: repr(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows)
-    return buffer.getvalue()
 
 
 def read_csv(path: str | Path) -> dict[str, Array]:

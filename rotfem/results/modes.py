@@ -15,9 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.results.columns import ShortTable, ShownUnits, by_unit, in_unit, named, number, numbers, per_cent
-from rotfem.results.files import csv_text, json_text, rows_text
-from rotfem.results.result import Array, Rows, Variables, column_of_rows, nodes_of
+from rotfem.results.columns import (
+    Columns,
+    ShortTable,
+    ShownUnits,
+    Variables,
+    by_unit,
+    in_unit,
+    named,
+    number,
+    numbers,
+    per_cent,
+)
+from rotfem.results.files import json_text
+from rotfem.results.result import Array, OfTable, Rows
 from rotfem.results.surfaces import Surface
 
 #: Powers of ξ in a mode polynomial.
@@ -101,6 +112,10 @@ class ModesResult(Rows):
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)
     index = ("mode",)
+    frequencies = OfTable("frequency", "Frequencies in the rotating frame, (modes,), rad/s; 0 of a rigid body.")
+    frequencies_hz = OfTable("frequency_hz", "Frequencies in the rotating frame, (modes,), Hz.")
+    damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (modes,).")
+    growth = OfTable("growth", "Growth Re λ of every mode, (modes,), 1/s; negative where it dies away.")
 
     @property
     def speed(self) -> float:
@@ -111,26 +126,6 @@ class ModesResult(Rows):
     def labels(self) -> list[str]:
         """Name of every mode."""
         return [row["label"] for row in self.rows]
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (modes,), rad/s; the rigid-body mode of a free hub has 0."""
-        return self.column("frequency")
-
-    @property
-    def frequencies_hz(self) -> Array:
-        """Frequencies in the rotating frame, shape (modes,), Hz."""
-        return self.column("frequency_hz")
-
-    @property
-    def damping(self) -> Array:
-        """Damping ratios −Re λ/|λ|, shape (modes,)."""
-        return self.column("damping")
-
-    @property
-    def growth(self) -> Array:
-        """Growth Re λ of every mode, shape (modes,), 1/s; negative where it dies away."""
-        return self.column("growth")
 
     @property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
@@ -148,43 +143,47 @@ class ModesResult(Rows):
         said = [f"{units.frequencies(row['frequency']):.5g} {units.frequency}" for row in rows]
         return list(zip(rows, self.shapes.values(), said, strict=True))
 
-    def texts(self) -> dict[str, str]:
-        """Return modes.csv, mode_shapes.csv, modes.json, and what else is wanted.
+    def data(self) -> dict[str, Columns]:
+        """Return the modes, their shapes, and the tables that are wanted.
 
         Raises:
             InputError: tables over the span are wanted of a plate.
         """
-        shapes, blade_files = dict[str, Array](), dict[str, str]()
-        if self.blade_tables:
-            fitted = self.mode_polynomials()
-            blade_files = {
-                "mode_table.csv": rows_text(self.mode_table()),
-                "mode_polynomials.csv": rows_text(fitted),
-                "elastodyn_modes.dat": elastodyn_lines(fitted),
-            }
+        shapes = dict[str, Array]()
         for i, columns in enumerate(self.shapes.values(), start=1):
             shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
-        return {
-            **({"sensitivities.csv": rows_text(self.sensitivities)} if self.sensitivities else {}),
-            **blade_files,
-            "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
-            "mode_shapes.csv": csv_text(shapes),
-            "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
-        }
+        out = {**super().data(), "mode_shapes": Columns(shapes, dimension="node")}
+        if self.sensitivities:
+            out["sensitivities"] = Columns.of_rows(self.sensitivities)
+        if self.blade_tables:
+            out["mode_table"] = Columns.of_rows(self.mode_table())
+            out["mode_polynomials"] = Columns.of_rows(self.mode_polynomials())
+        return out
 
-    def _of_beam(self) -> Iterator[tuple[dict[str, Any], dict[str, Array], dict[str, tuple[Array, Array]]]]:
-        """Yield of every mode with a shape its number and names, real columns, and direction ↦ displacement, slope."""
+    def texts(self) -> dict[str, str]:
+        """Return a CSV file of each table, modes.json, and elastodyn_modes.dat where it is wanted.
+
+        Raises:
+            InputError: tables over the span are wanted of a plate.
+        """
+        fitted = {"elastodyn_modes.dat": elastodyn_lines(self.mode_polynomials())} if self.blade_tables else {}
+        modes = json_text({"speed": self.summary["speed"], "modes": self.rows})
+        return {**super().texts(), **fitted, "modes.json": modes}
+
+    def _over_span(self) -> Iterator[tuple[dict[str, Any], dict[str, Array]]]:
+        """Yield number, label and frequency of every mode with a shape, and its real columns over the span."""
         if self.triangles is not None:
             raise InputError("structure.type", "plate", "tables over the span are those of beams")
         for row, shape, _ in self.with_shapes():
-            columns = _real(shape)
-            found = {  # rotations of a shape are multiplied by the length of the beam
-                name: (columns[u], sign * columns[theta] / columns["x"][-1])
-                for name, kinds in DIRECTIONS.items()
-                for u, theta, sign in kinds
-                if u in columns and theta in columns
-            }
-            yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, columns, found
+            columns, length = _real(shape), shape["x"][-1]  # by which rotations of a shape are multiplied
+            out = {"span": columns["x"] / length}
+            for direction, kinds in DIRECTIONS.items():
+                for u, theta, sign in kinds:
+                    if u in columns and theta in columns:
+                        out[f"{direction}_displacement"] = columns[u]
+                        out[f"{direction}_slope"] = sign * columns[theta] / length
+            out |= {"twist": columns["theta1"] / length} if "theta1" in columns else {}
+            yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, out
 
     def mode_table(self) -> list[dict[str, Any]]:
         """Return one row a mode and node: displacement and slope in flap and lag, and twist, over the span.
@@ -196,16 +195,11 @@ class ModesResult(Rows):
         Raises:
             InputError: the structure is no beam.
         """
-        out = []
-        for mode, columns, found in self._of_beam():
-            values: dict[str, Array] = {"span": columns["x"] / columns["x"][-1]}
-            for direction, pair in found.items():
-                values |= dict(zip((f"{direction}_displacement", f"{direction}_slope"), pair, strict=True))
-            if "theta1" in columns:
-                values["twist"] = columns["theta1"] / columns["x"][-1]
-            rows = zip(*(column.tolist() for column in values.values()), strict=True)
-            out += [mode | dict(zip(values, row, strict=True)) for row in rows]
-        return out
+        return [
+            mode | dict(zip(columns, row, strict=True))
+            for mode, columns in self._over_span()
+            for row in zip(*(values.tolist() for values in columns.values()), strict=True)
+        ]
 
     def mode_polynomials(self) -> list[dict[str, Any]]:
         """Return one row a bending mode: the polynomial of its leading displacement, and how well it fits.
@@ -219,13 +213,14 @@ class ModesResult(Rows):
             InputError: the structure is no beam.
         """
         out: list[dict[str, Any]] = []
-        for mode, columns, found in self._of_beam():
-            sizes = {name: float(np.max(np.abs(shape))) for name, (shape, _) in found.items()}
+        for mode, columns in self._over_span():
+            shapes = {name: columns[f"{name}_displacement"] for name in DIRECTIONS if f"{name}_displacement" in columns}
+            sizes = {name: float(np.max(np.abs(shape))) for name, shape in shapes.items()}
             direction = max(sizes, key=lambda name: sizes[name])
-            shape = found[direction][0]
+            shape = shapes[direction]
             if sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
                 continue  # torsion and stretch, and shapes with a node at the tip
-            coefficients, off = fit(columns["x"] / columns["x"][-1], shape / shape[-1])
+            coefficients, off = fit(columns["span"], shape / shape[-1])
             number = 1 + sum(other["direction"] == direction for other in out)
             terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
             errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
@@ -247,7 +242,7 @@ class ModesResult(Rows):
         errors = [e if row["stability"] != "unresolved" else None for e, row in zip(errors, rows, strict=True)]
         columns = [
             [str(row["mode"]) for row in rows],
-            [row["name"] for row in rows],
+            [row["label"] for row in rows],
             numbers([float(in_unit(row["frequency"], first)) for row in rows], 8),
             numbers([row["frequency_hz"] for row in rows], 8),
             [per_cent(row["damping"]) for row in rows],
@@ -256,26 +251,20 @@ class ModesResult(Rows):
         head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
         return [ShortTable(head, list(zip(*columns, strict=True)))]
 
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the columns of modes.csv over `mode`, and the shapes over `mode` and `node`.
+    def arrays(self) -> Variables:
+        """Return the columns of modes.csv over `mode`, the speed (rad/s), and the shapes over `mode` and `node`.
 
-        Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none.
-        Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
+        Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none. Nodes have
+        `x` (m), of a plate `y` and `triangles` too.
         """
-        names = [name for name in (self.rows[0] if self.rows else ()) if name not in ("mode", "label")]
-        over: Variables = {name: (("mode",), column_of_rows(self.rows, name)) for name in names}
-        coordinates: Variables = {
-            "mode": (("mode",), np.array([row["mode"] for row in self.rows], dtype=np.int64)),
-            "label": (("mode",), np.array(self.labels, dtype=str)),
-            "speed": ((), np.array(self.speed)),
-        }
-        first = next(iter(self.shapes.values()), {})
+        out = super().arrays() | {"speed": ((), np.array(self.speed))}
+        first, rigid = next(iter(self.shapes.values()), {}), len(self.rows) - len(self.shapes)
+        out |= {name: (("node",), first[name]) for name in ("x", "y") if name in first}
         for name in (name for name in first if f"{name}_imag" in first):
             values = np.full((len(self.rows), len(first[name])), np.nan, dtype=np.complex128)
-            for i, columns in enumerate(self.shapes.values(), start=len(self.rows) - len(self.shapes)):
-                values[i] = columns[name] + 1j * columns[f"{name}_imag"]
-            over[f"shape_{name}"] = (("mode", "node"), values)
-        return over, coordinates | nodes_of(first, self.triangles)
+            values[rigid:] = [columns[name] + 1j * columns[f"{name}_imag"] for columns in self.shapes.values()]
+            out[f"shape_{name}"] = ("mode", "node"), values
+        return out if self.triangles is None else out | {"triangles": (("triangle", "corner"), self.triangles)}
 
 
 @dataclass(repr=False)
@@ -286,27 +275,20 @@ class ResponseResult(Rows):
         summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
         rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
             spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
-            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
-            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
-            all outputs; `peak` (1 at frequencies that were added to see a peak).
+            unit) and `tip_u2_phase` (rad, how far it is ahead of a load of phase 0); `peak` (1 at frequencies that were
+            added to see a peak).
         direct: complex amplitudes of the outputs, shape (frequencies, outputs).
-        modal: the same by modes.
     """
 
     direct: npt.NDArray[np.complex128]
-    modal: npt.NDArray[np.complex128]
     index = ("frequency",)
+    frequencies = OfTable("frequency", "Frequencies, (frequencies,), rad/s, increasing.")
     figure = "results.plots:response_figure"
 
     @property
     def outputs(self) -> list[str]:
         """Names of the outputs: of the tip `tip_u1`, …, of the root `root_f1`, …, of stations `M@2.5`, …."""
         return list(self.summary["outputs"])
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies, rad/s, increasing."""
-        return self.column("frequency")
 
     def amplitude(self, output: str) -> Array:
         """Return the amplitude of an output over the frequencies, in its unit."""
@@ -315,10 +297,6 @@ class ResponseResult(Rows):
     def phase(self, output: str) -> Array:
         """Return the phase of an output over the frequencies, rad, from −π to π."""
         return np.asarray(np.angle(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
-
-    def texts(self) -> dict[str, str]:
-        """Return response.csv."""
-        return {"response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows))}
 
     def tables(self) -> list[ShortTable]:
         """Return where every output is largest."""
@@ -329,9 +307,3 @@ class ResponseResult(Rows):
             for name, peak in peaks.items()
         ]
         return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`."""
-        over, outputs = ("frequency", "output"), np.array(self.outputs, dtype=str)
-        coordinates: Variables = {"frequency": (over[:1], self.frequencies), "output": (over[1:], outputs)}
-        return {"direct": (over, self.direct), "modal": (over, self.modal)}, coordinates

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import ZERO, ShortTable, number, numbers, per_cent
-from rotfem.results.files import csv_text, json_text
-from rotfem.results.result import Array, Result, Row, Rows, Variables, column_of_rows, frame
+from rotfem.results.columns import ZERO, Columns, ShortTable, number, numbers, per_cent
+from rotfem.results.files import json_text
+from rotfem.results.result import Array, Result, Row, Rows
 from rotfem.results.surfaces import HALF_WIDTH
 
 if TYPE_CHECKING:
-    import pandas
     from matplotlib.figure import Figure
 
 #: Panels of properties: names in one panel, its label, whether on a logarithmic axis.
@@ -63,9 +62,10 @@ class CheckResult(Result):
         """Inertia tensor about the clamp, kg·m², shape (3, 3)."""
         return np.array(self.summary["inertia_root"])
 
-    def texts(self) -> dict[str, str]:
-        """Return check.csv, of a beam."""
-        return {"check.csv": csv_text(self.columns)} if self.columns else {}
+    @property
+    def table(self) -> Columns:
+        """Properties along a beam over `x`; of a plate the coordinates of its nodes."""
+        return Columns(self.columns, ("x",)) if self.columns else Columns(self.nodes, dimension="node")
 
     def tables(self) -> list[ShortTable]:
         """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
@@ -88,17 +88,6 @@ class CheckResult(Result):
                 for i, row in enumerate(tensor)
             ]
         return [ShortTable(("", ""), scalars), ShortTable(("axes of the frame", "1", "2", "3"), vectors)]
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the properties along a beam, indexed by `x`; of a plate the coordinates of its nodes."""
-        columns = self.columns or self.nodes
-        return frame(columns, next(iter(columns)))
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the properties along a beam over `x`; of a plate the coordinates over `node`."""
-        columns = self.columns or {"node": np.arange(len(next(iter(self.nodes.values()))), dtype=float), **self.nodes}
-        name, *others = columns
-        return {other: ((name,), columns[other]) for other in others}, {name: ((name,), columns[name])}
 
 
 def check_figure(result: CheckResult) -> Figure:
@@ -129,7 +118,7 @@ def check_figure(result: CheckResult) -> Figure:
         if len(names) > 1:
             axis.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     s = result.summary
-    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
+    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m, axes of the rotating frame", fontsize=10)
     return figure
 
 
@@ -157,7 +146,7 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
         axis.plot(r[:, i], r[:, j], "k", lw=1.2)
     center = result.summary["center_of_mass"]
     axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
-    dress(axis, f"{i + 1} (m)", f"{j + 1} (m)")
+    dress(axis, f"axis {i + 1} (m)", f"axis {j + 1} (m)")
     if (i, j) == (1, 2):  # the angles of sections are what they are
         axis.set_aspect("equal", adjustable="datalim")
 
@@ -242,20 +231,6 @@ class ExplainResult(Rows):
                 flat |= {f"{what}_{output}": value for output, value in row.get(what, {}).items()}
             rows.append(flat)
         return rows
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return `estimate` and, with a check, `truth` over `name` and `output`, and the other columns over `name`.
-
-        Infinite where a model fails, NaN where the truth was not computed.
-        """
-        names = ("kind", "included", "worst", "verdict", "why")
-        over: Variables = {name: (("name",), column_of_rows(self.rows, name)) for name in names}
-        for what in ("estimate", "truth"):
-            if any(what in row for row in self.rows):
-                values = [[row.get(what, {}).get(output, np.nan) for output in self.outputs] for row in self.rows]
-                over[what] = (("name", "output"), np.array(values, dtype=np.float64))
-        names_of = {"name": [row["name"] for row in self.rows], "output": self.outputs}
-        return over, {key: ((key,), np.array(values, dtype=str)) for key, values in names_of.items()}
 
 
 def explain_figure(result: ExplainResult) -> Figure:

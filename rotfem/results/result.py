@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import base64
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -18,8 +17,8 @@ import numpy.typing as npt
 
 from rotfem.errors import printable
 from rotfem.registry import resolved
-from rotfem.results.columns import ShortTable, described
-from rotfem.results.files import json_text, rows_text, write_whole
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, Variables, dataset
+from rotfem.results.files import json_text, write_whole
 
 if TYPE_CHECKING:
     import pandas
@@ -28,9 +27,6 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Row = dict[str, Any]
-
-#: Name of a labelled array ↦ its dimensions and values.
-Variables = dict[str, tuple[tuple[str, ...], npt.NDArray[Any]]]
 
 
 @dataclass(repr=False)
@@ -82,9 +78,28 @@ class Result(ABC):
         """Return file name ↦ text, in the order they are written: tables, then summary.json."""
         return {**self.texts(), "summary.json": json_text(self.summary)}
 
+    @property
     @abstractmethod
+    def table(self) -> Columns:
+        """Main table: what pandas and, with more of some results, xarray have."""
+
+    def data(self) -> dict[str, Columns]:
+        """Return name of a CSV file, without its ending ↦ its columns."""
+        return {self.summary["command"]: self.table}
+
+    def column(self, name: str) -> Array:
+        """Return the numbers of a column of the main table, such as `frequency`: of every row, or over its grid.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        if name not in self.table.numbers:
+            raise KeyError(f"no number {name!r} in the table; there are {', '.join(self.table.numbers)}")
+        return np.asarray(self.table.grid(name)[1], dtype=np.float64)
+
     def texts(self) -> dict[str, str]:
         """Return file name ↦ text of the tables."""
+        return {f"{name}.csv": columns.csv() for name, columns in self.data().items()}
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes files that are not text into a folder, each one whole or none; none here."""
@@ -102,26 +117,18 @@ class Result(ABC):
     def tables(self) -> list[ShortTable]:
         """Return short tables of what matters most, as commands print them and notebooks show them."""
 
-    @abstractmethod
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the result as a table.
+        """Return the main table, labelled by what its rows are of."""
+        return self.table.to_pandas()
 
-        Raises:
-            ImportError: pandas is not installed.
-        """
+    def arrays(self) -> Variables:
+        """Return the labelled arrays, name ↦ dimensions and values: the columns of the main table."""
+        return self.table.variables()
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the result (see `arrays`) as labelled arrays with `units` and `long_name` among their attributes.
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return the result as labelled arrays (see `arrays`) with `units` and `long_name` among their attributes."""
         names = ("command", "name", "theory", "frame", "kind", "status")
-        return dataset(*self.arrays(), {name: self.summary[name] for name in names if name in self.summary})
-
-    @abstractmethod
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return variables and coordinates of the labelled arrays."""
+        return dataset(self.arrays(), {name: self.summary[name] for name in names if name in self.summary})
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the files into a folder, in the place of the results that are there; return their paths.
@@ -176,43 +183,33 @@ class Rows(Result):
 
     rows: list[Row]
 
-    #: Names that label the rows, and the dimension that the labelled arrays have of them.
+    #: Names that label the rows, and what these are called where there are none.
     index: ClassVar[tuple[str, ...]] = ()
     dimension: ClassVar[str] = "row"
 
-    def column(self, name: str) -> Array:
-        """Return a number of every row, such as `frequency`, shape (rows,).
-
-        Raises:
-            KeyError: there is none of that name.
-        """
-        there = [key for key, value in (self.rows[0] if self.rows else {}).items() if not isinstance(value, str)]
-        if name not in there:
-            raise KeyError(f"no number {name!r} of the rows; there are {', '.join(there)}")
-        return np.array([row[name] for row in self.rows], dtype=np.float64)
-
     def flat_rows(self) -> list[Row]:
-        """Return the rows as a table has them, with one value a name."""
-        return self.rows
+        """Return the rows as a table has them, with one value a name, and in the units shown too."""
+        return ShownUnits.of(self.summary).rows(self.rows)
 
-    def texts(self) -> dict[str, str]:
-        """Return the rows as a CSV file that is called after the command."""
-        return {f"{self.summary['command']}.csv": rows_text(self.flat_rows())}
+    @property
+    def table(self) -> Columns:
+        """The rows as columns, labelled by `index`."""
+        return Columns.of_rows(self.flat_rows(), self.index, self.dimension)
 
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the columns over `dimension`, the number of the row from 0 on."""
-        rows = self.flat_rows()
-        names = dict.fromkeys(name for row in rows for name in row)
-        return {name: ((self.dimension,), column_of_rows(rows, name)) for name in names}, {}
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the rows as a table, labelled by `index`; what a row does not have is NaN.
+class OfTable:
+    """Attribute of a result that holds a column of its main table.
 
-        Raises:
-            ImportError: pandas is not installed.
-        """
-        table = optional("pandas").DataFrame(self.flat_rows())
-        return table.set_index(list(self.index)) if self.index and not table.empty else table
+    Args:
+        name: of the column.
+        doc: what it is, its shape and unit.
+    """
+
+    def __init__(self, name: str, doc: str):
+        self.name, self.__doc__ = name, doc
+
+    def __get__(self, result: Result | None, of: type[Result]) -> Array:
+        return self if result is None else result.column(self.name)  # type: ignore[return-value]
 
 
 def image(figure: Figure, dpi: int, format: str = "png") -> bytes:
@@ -248,48 +245,3 @@ def save(figure: Figure, path: Path) -> Path:
         OutputError: it cannot be written.
     """
     return write_whole(path, image(figure, 100, path.suffix[1:] or "png"))
-
-
-# --- pandas and xarray, which nothing else needs ----------------------------------------------------------------------
-
-
-def optional(name: str) -> Any:
-    """Return a package that rotfem can do without."""
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        missing = error.name or name
-        raise ImportError(f"to_{name}() needs {missing}, which is not installed: pip install {missing}") from error
-
-
-def frame(columns: Mapping[str, Any], *index: str) -> pandas.DataFrame:
-    """Return named columns as a table indexed by one or several of them."""
-    return optional("pandas").DataFrame(dict(columns)).set_index(list(index))
-
-
-def dataset(variables: Variables, coordinates: Variables, attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """Return variables over coordinates, each with its `long_name` and `units` as far as they are known."""
-    out = optional("xarray").Dataset(variables, coordinates, dict(attributes))
-    for name, array in out.variables.items():
-        what, unit = described(name)
-        array.attrs |= {"long_name": what, "units": unit} if unit else {}
-    return out
-
-
-def column_of_rows(rows: Sequence[Mapping[str, Any]], name: str) -> npt.NDArray[Any]:
-    """Return the values of one name over rows: truth values, text, or numbers; "" or NaN stand for what is absent."""
-    values = [row.get(name) for row in rows]
-    there = [value for value in values if value is not None]
-    if there and all(isinstance(value, bool | np.bool_) for value in values):
-        return np.array(values, dtype=bool)
-    if any(isinstance(value, str) for value in there):
-        return np.array(["" if value is None else str(value) for value in values], dtype=str)
-    if all(isinstance(value, int) for value in values):
-        return np.array(values, dtype=np.int64)
-    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
-
-
-def nodes_of(columns: Mapping[str, npt.NDArray[Any]], triangles: Any) -> Variables:
-    """Return where the nodes of columns are and, of a plate, the triangles between them."""
-    out: Variables = {name: (("node",), columns[name]) for name in ("x", "y") if name in columns}
-    return out if triangles is None else {**out, "triangles": (("triangle", "corner"), np.asarray(triangles))}

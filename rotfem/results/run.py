@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotfem.results.columns import ShortTable, by_unit, described, largest, named, number
-from rotfem.results.files import csv_text, whole_hdf5
-from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
+from rotfem.results.columns import Columns, ShortTable, Variables, by_unit, dataset, largest, named, number
+from rotfem.results.result import Array, OfTable, Result
 from rotfem.short import short_fields
 
 if TYPE_CHECKING:
@@ -46,36 +45,20 @@ class StationHistory:
             raise KeyError(f"no quantity {name!r} at the stations; there are {', '.join(self.values)}")
         return self.values[name]
 
-    def columns(self) -> dict[str, Array]:
-        """Return t, x and all quantities as columns, a row for each time and station."""
+    @property
+    def columns(self) -> Columns:
+        """Columns t, x and all quantities, a row for each time and station: as CSV, HDF5, pandas or labelled arrays."""
         n, m = len(self.t), len(self.x)
-        out = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
-        return out | {name: values.ravel() for name, values in self.values.items()}
+        rows = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
+        return Columns(rows | {name: values.ravel() for name, values in self.values.items()}, ("t", "x"))
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the columns as a table indexed by `t` (s) and `x` (m)."""
-        return frame(self.columns(), "t", "x")
+        """Return the quantities as a table indexed by `t` (s) and `x` (m)."""
+        return self.columns.to_pandas()
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the quantities over `t` (s) and `x` (m)."""
-        over: Variables = {name: (("t", "x"), values) for name, values in self.values.items()}
-        return dataset(over, {"t": (("t",), self.t), "x": (("x",), self.x)}, {})
-
-    def text(self) -> str:
-        """Return the columns as CSV."""
-        return csv_text(self.columns())
-
-    def write_hdf5(self, path: Path) -> Path:
-        """Write t, x and the quantities as HDF5 datasets with their units; return the path.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        with whole_hdf5(path) as file:
-            for name, values in {"t": self.t, "x": self.x, **self.values}.items():
-                data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
-                data.attrs["long_name"], data.attrs["units"] = described(name)
-        return path
+        return dataset(self.columns.variables(), {})
 
 
 class Table:
@@ -126,10 +109,7 @@ class RunResult(Result):
     resultants: dict[str, Array] = field(default_factory=dict)
     further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
-    @property
-    def t(self) -> Array:
-        """Times of the history, shape (n,), s."""
-        return self.column("t")
+    t = OfTable("t", "Times of the history, shape (n,), s.")
 
     @property
     def tip(self) -> dict[str, Array]:
@@ -146,30 +126,28 @@ class RunResult(Result):
         """Figures of merit: of every tip component smallest and largest value, their times, and the last value."""
         return dict(self.summary["figures"])
 
-    def column(self, name: str) -> Array:
-        """Return a column of the history, shape (n,).
+    @property
+    def table(self) -> Columns:
+        """The history over `t`."""
+        return Columns(self.history, ("t",))
 
-        Raises:
-            KeyError: there is none of that name.
-        """
-        if name not in self.history:
-            raise KeyError(f"no column {name!r} in the history; there are {', '.join(self.history)}")
-        return self.history[name]
+    def data(self) -> dict[str, Columns]:
+        """Return the history, the shape at its end and the stress resultants, as far as there are any."""
+        of_nodes = {"shape": self.shape, "resultants": self.resultants}
+        nodes = {name: Columns(columns, dimension="node") for name, columns in of_nodes.items() if columns}
+        return {"history": self.table, **nodes}
 
     def texts(self) -> dict[str, str]:
-        """Return history.csv, shape.csv, resultants.csv and stations.csv, as far as there is one."""
-        tables = {"history.csv": self.history, "shape.csv": self.shape, "resultants.csv": self.resultants}
-        texts = {name: csv_text(columns) for name, columns in tables.items() if columns}
-        if self.stations is not None and self.stations.format == "csv":
-            texts["stations.csv"] = self.stations.text()
-        return texts
+        """Return a CSV file of each table, and stations.csv where that is asked for."""
+        stations = self.stations if self.stations is not None and self.stations.format == "csv" else None
+        return super().texts() | ({} if stations is None else {"stations.csv": stations.columns.csv()})
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes stations.h5 and files for ParaView, where these are asked for."""
         stations = self.stations
         if stations is None or stations.format != "hdf5":
             return list(self.further)
-        return [lambda folder: stations.write_hdf5(folder / "stations.h5"), *self.further]
+        return [lambda folder: stations.columns.write_hdf5(folder / "stations.h5"), *self.further]
 
     def drawn(self) -> dict[str, str]:
         """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""
@@ -200,19 +178,10 @@ class RunResult(Result):
             rows.append((named(name), low, when[0], high, when[1], last))
         return [ShortTable(("", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)] if rows else []
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the history, one row a time, indexed by `t` (s)."""
-        return frame(self.history, "t")
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return the history over `t` (s), and the shape at its end over `node` with the nodes' `x` (m).
-
-        A plate has the nodes' `y` and the `triangles` between them too.
-        """
-        over: Variables = {name: (("t",), values) for name, values in self.history.items() if name != "t"}
-        nodes = nodes_of(self.shape, self.triangles)
-        over |= {name: (("node",), values) for name, values in self.shape.items() if name not in nodes}
-        return over, {"t": (("t",), self.t), **nodes}
+    def arrays(self) -> Variables:
+        """Return the history over `t` (s), and shape and resultants over `node`, of a plate with its `triangles`."""
+        out = {name: values for columns in self.data().values() for name, values in columns.variables().items()}
+        return out if self.triangles is None else out | {"triangles": (("triangle", "corner"), self.triangles)}
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:

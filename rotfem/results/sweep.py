@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ import numpy.typing as npt
 
 from rotfem.results.columns import ZERO, ShortTable, label_of, numbers
 from rotfem.results.files import writing
-from rotfem.results.result import Rows, Variables, column_of_rows
+from rotfem.results.result import Rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,10 +58,6 @@ class SweepResult(Rows):
         return dict(self.summary["keys"])
 
     @property
-    def _shape(self) -> tuple[int, ...]:
-        return tuple(map(len, self.keys.values()))
-
-    @property
     def names(self) -> list[str]:
         """Names of what was computed."""
         no = {*self.keys, "status", "reason", "folder"}
@@ -70,11 +65,11 @@ class SweepResult(Rows):
 
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
-        return column_of_rows(self.rows, name).astype(np.float64).reshape(self._shape)
+        return np.asarray(self.table.grid(name)[1], dtype=np.float64)
 
     def large(self) -> list[Callable[[Path], object]]:
-        """Return what writes sweep.nc, where xarray is installed."""
-        return [self._netcdf] if find_spec("xarray") else []
+        """Return what writes sweep.nc."""
+        return [self._netcdf]
 
     def _netcdf(self, folder: Path) -> None:
         with writing(folder / "sweep.nc"):
@@ -102,12 +97,6 @@ class SweepResult(Rows):
         columns += [numbers([row.get(name) for row in self.rows]) for name in names]
         columns.append([row["status"] for row in self.rows])
         return [ShortTable((*self.keys, *map(label_of, names), "status"), list(zip(*columns, strict=True)))]
-
-    def arrays(self) -> tuple[Variables, Variables]:
-        """Return what was computed over the swept keys, each a dimension."""
-        over: Variables = {name: (self.index, self.array(name)) for name in self.names}
-        over["status"] = self.index, column_of_rows(self.rows, "status").reshape(self._shape)
-        return over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}
 
 
 def sweep_figure(result: SweepResult) -> Figure:

@@ -4,58 +4,52 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
 
 from rotfem.places import apart
 from rotfem.scene.blades.deck import Asked, keys_of
-from rotfem.scene.files import existing_file
+from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
-from rotfem.scene.span_tables import OF_FILE, AnyProfile, FromFile
+from rotfem.scene.span_tables import symmetric
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import SceneModel, Unit, along, problem, problems_at
+from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
     DIGITS,
     ROUND_OFF,
     Array,
-    Bounds,
     Matrix,
     NonNegative,
     Number,
     PaddedVector,
     Positive,
     Profile,
+    Rows,
+    Span,
     Vector,
-    as_number,
-    as_rows,
-    as_symmetric_matrix,
-    check_magnitudes,
     check_profile_length,
     on_span,
 )
 
-
-def _as_inertia(value: Any) -> float | Matrix:
-    """Return a moment of inertia or a tensor, 3×3; raise on anything else."""
-    if isinstance(value, list | tuple):
-        return as_symmetric_matrix(value, 3, definite=False)
-    return Bounds(ge=0.0).number(value)
+#: A moment of inertia or a tensor, 3×3.
+Inertia = Annotated[
+    Annotated[NonNegative, Tag("<one>")] | Annotated[Rows, symmetric(3, definite=False), Tag("<rows>")],
+    BY_SHAPE,
+    unit("kg*m**2"),
+]
+Length = Annotated[NonNegative, unit("m")]
+Mass = Annotated[NonNegative, unit("kg")]
 
 
 def _as_matrix(inertia: float | Matrix) -> Array:
     """Return an inertia tensor (kg·m²), shape (3, 3), of one that may be isotropic."""
     return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
-
-
-Inertia = Annotated[float | Matrix, PlainValidator(_as_inertia), Unit("kg*m**2")]
-Length = Annotated[NonNegative, Unit("m")]
-Mass = Annotated[NonNegative, Unit("kg")]
 
 
 class PointMass(SceneModel):
@@ -69,9 +63,9 @@ class PointMass(SceneModel):
             a number, isotropic.
     """
 
-    x: Annotated[Number, Unit("m")] = Field(description="a place along the beam (m)")
+    x: Annotated[Number, unit("m")]
     mass: Mass = 0.0
-    offset: Annotated[PaddedVector, Unit("m")] = (0.0, 0.0, 0.0)
+    offset: Annotated[PaddedVector, unit("m")] = (0.0, 0.0, 0.0)
     inertia: Inertia = 0.0
 
     @property
@@ -97,11 +91,11 @@ class BeamStructure(StructureTable):
     """
 
     type: str
-    length: Annotated[Positive, Unit("m")] = Field(description="a number greater than 0 (m)")
+    length: Annotated[Positive, unit("m")]
     hub_radius: Length = 0.0
     tip_mass: Mass = 0.0
     masses: tuple[PointMass, ...] = ()
-    damping: Damping = Damping()
+    damping: Damping = empty()
 
     if TYPE_CHECKING:
         section: PlanarSection | SpatialSection
@@ -139,13 +133,10 @@ class BeamStructure(StructureTable):
         return self.section.has_rotary_inertia
 
     def _check_tables(self, slack: float = ROUND_OFF) -> None:
-        """Refuse tapers of the section that end elsewhere, properties of a size that cannot be, masses elsewhere."""
+        """Refuse tapers of the section that end elsewhere, and masses elsewhere."""
         section = self.section
         for name, taper in section.tapers.items():
             check_profile_length(f"section.{name}", taper, self.length, slack)
-        if section.way.name != "matrix":
-            properties = section.central if isinstance(section, SpatialSection) else section.at
-            check_magnitudes(lambda: properties(section.knots), "section")
         for i, body in enumerate(self.masses):
             key = f"masses.{i}"
             if not on_span(body.x, self.length):
@@ -168,9 +159,9 @@ class PlanarBeamStructure(BeamStructure):
 
     is_planar: ClassVar[bool] = True
     type: Literal["planar_beam"] = "planar_beam"
-    tip_inertia: Annotated[NonNegative, Unit("kg*m**2")] = 0.0
-    root: Root = Root()
-    section: PlanarSection = Field(description="a table of section properties")
+    tip_inertia: Annotated[NonNegative, unit("kg*m**2")] = 0.0
+    root: Root = empty()
+    section: PlanarSection
 
     @property
     def root_position(self) -> tuple[float, float, float]:
@@ -181,20 +172,19 @@ class PlanarBeamStructure(BeamStructure):
         self._check_tables()
 
 
-def _as_sweep(value: Any) -> Profile:
+def _check_sweep(rows: Any) -> Any:
     """Return a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
-    if not isinstance(value, list | tuple):
-        return Bounds().profile(value)
-    rows = as_rows(value, (2,), "a profile [[x, angle], …]")
-    x = [row[0] for row in rows]
-    times = Counter(x)
-    if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or max(times.values()) > 2 or times[x[0]] + times[x[-1]] > 2:
-        raise problem("", value, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink")
-    return tuple((row[0], row[1]) for row in rows)
+    if isinstance(rows, tuple):
+        x = [row[0] for row in rows]
+        times = Counter(x)
+        if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or max(times.values()) > 2 or times[x[0]] + times[x[-1]] > 2:
+            raise problem(
+                "", None, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink"
+            )
+    return rows
 
 
-#: Where points of a line may come from.
-LINE_FILE = FromFile((3,), "points [[x, y, z], …]")
+Line = Annotated[tuple[Vector, ...], AfterValidator(as_line), FROM_FILE, unit("m")]
 
 
 class SpatialBeamStructure(BeamStructure):
@@ -220,15 +210,15 @@ class SpatialBeamStructure(BeamStructure):
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
-    hub_offset: Annotated[Vector, Unit("m")] | None = None
+    hub_offset: Annotated[Vector, unit("m")] | None = None
     tip_inertia: Inertia = 0.0
-    tip_offset: Annotated[Vector, Unit("m")] = (0.0, 0.0, 0.0)
-    section: SpatialSection = Field(description="a table of section properties")
-    pretwist: Annotated[AnyProfile, along("rad")] = 0.0
-    sweep: Annotated[Profile, PlainValidator(_as_sweep), OF_FILE, along("rad")] = 0.0
-    line: Annotated[Matrix, PlainValidator(as_line), LINE_FILE, Unit("m")] | None = None
-    precone: Annotated[Number, Unit("rad")] = 0.0
-    root: SpatialRoot = SpatialRoot()
+    tip_offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
+    section: SpatialSection
+    pretwist: Annotated[Profile[Number], along("rad")] = 0.0
+    sweep: Annotated[Span[Number], AfterValidator(_check_sweep), along("rad")] = 0.0
+    line: Line | None = None
+    precone: Annotated[Number, unit("rad")] = 0.0
+    root: SpatialRoot = empty()
     supports: tuple[Support, ...] = ()
 
     @property
@@ -291,17 +281,11 @@ class SpatialBeamStructure(BeamStructure):
         if not isinstance(section, Mapping):
             return data
         section, lifted = with_columns(section, info, "section."), dict[str, Any]()
-        readers: dict[str, Any] = {
-            "pretwist": lambda value: Bounds().profile(OF_FILE(along("rad").read(value), info)),
-            "precone": lambda value: as_number(Unit("rad").read(value)),
-        }
-        for key, read in readers.items():
-            if key not in section:
-                continue
+        for key in {"pretwist", "precone"} & section.keys():
             if key in data:
                 raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
             with problems_at(f"section.{key}", section[key]):
-                lifted[key] = read(section[key])
+                lifted[key] = _reader(key).validate_python(section[key], context=info.context)
         return {**data, **lifted, "section": {key: value for key, value in section.items() if key not in lifted}}
 
     def _check(self) -> None:
@@ -329,20 +313,29 @@ class SpatialBeamStructure(BeamStructure):
             raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
 
 
-Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
+if TYPE_CHECKING:
+    Structure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
+else:
+    _TYPES = {"planar_beam": PlanarBeamStructure, "spatial_beam": SpatialBeamStructure, "plate": PlateStructure}
+    Structure = Annotated[Any, one_of(_TYPES)]
+
+
+@cache
+def _reader(key: str) -> TypeAdapter[Any]:
+    """Return what reads the value of a key of a spatial beam before the whole table is read."""
+    return TypeAdapter(get_type_hints(SpatialBeamStructure, include_extras=True)[key])
 
 
 def _with_length(data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
     """Return the table with the arc length of its line as its length; raise if another one is given."""
-    if data.get("line") is None:
-        return data
-    with problems_at("line", data["line"]):
-        rows = LINE_FILE(Unit("m").read(data["line"]), info)
     try:
-        arc = line_through(as_line(rows)).length
-    except PydanticCustomError:
+        rows = _reader("line").validate_python(data.get("line"), context=info.context)
+    except ValidationError:
         return {**data, "length": 1.0}  # the error of the line is reported at its key
-    given = Unit("m").read(data.get("length", arc))
+    if rows is None:
+        return data
+    arc = line_through(rows).length
+    given = in_units(data.get("length", arc), ["m"])
     if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > DIGITS * arc:
         raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")
     return {**data, "line": rows, "length": arc}

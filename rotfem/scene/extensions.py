@@ -11,22 +11,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
-from pydantic import PlainValidator
+from pydantic import BeforeValidator
 
 from rotfem import registry
 from rotfem.errors import SceneError, shown
-from rotfem.scene.files import LARGEST, Unreadable, read_bytes
-from rotfem.scene.table import SceneModel, problem
+from rotfem.scene.files import Unreadable, read_bytes
+from rotfem.scene.table import SceneModel
 
 #: Resolved paths of the files that have been run.
 _LOADED: set[Path] = set()
-
-
-def _as_files(value: Any) -> tuple[str, ...]:
-    files = [value] if isinstance(value, str) else value
-    if not isinstance(files, list | tuple) or not all(isinstance(name, str) and name for name in files):
-        raise problem("", value, "must be the path of a Python file, or a list of them")
-    return tuple(files)
 
 
 class Extensions(SceneModel):
@@ -36,7 +29,7 @@ class Extensions(SceneModel):
         load: paths of Python files, from the folder of the scene, that are run before the scene is read.
     """
 
-    load: Annotated[tuple[str, ...], PlainValidator(_as_files)] = ()
+    load: Annotated[tuple[str, ...], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)] = ()
 
 
 def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
@@ -55,7 +48,7 @@ def load(name: str, path: Path, file: str, key: str) -> None:
     of the key and the file that name it, under the name that the user has given.
     """
     try:
-        source = read_bytes(path, LARGEST)
+        source = read_bytes(path)
         path = path.resolve()
     except (Unreadable, OSError) as error:
         raise SceneError(file, key, name, str(error)) from None

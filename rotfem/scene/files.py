@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-import os
 import re
-import select
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from pydantic import ValidationInfo
+from pydantic import BeforeValidator, ValidationInfo
+from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
-from rotfem.scene.values import Matrix, as_rows, limits_in
-
-#: What a pipe may keep one waiting (s) before it has anything to say.
-PATIENCE = 10.0
+from rotfem.units import is_quantity
 
 #: Files that a scene which is being read consists of; None where they are not recorded.
 _read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
@@ -51,38 +47,22 @@ class Unreadable(Exception):
     """A file cannot be read; its words say why."""
 
 
-def read_bytes(path: Path, most: int) -> bytes:
-    """Return the content of a file or a pipe.
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file.
 
     Raises:
-        Unreadable: there is none, it is a directory, it has more than `most` bytes, or nothing comes out of a pipe.
+        Unreadable: there is none, it is a directory, or it may not be read.
     """
     note(path)
-    content = bytearray()
     try:
-        # A pipe without a writer would block here.
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            if not select.select([file], [], [], PATIENCE)[0]:
-                raise Unreadable(f"nothing can be read from it: no byte came in {PATIENCE:g} s")
-            os.set_blocking(file.fileno(), True)
-            while len(content) <= most and (piece := file.read(1 << 20)):
-                content += piece
+        return path.read_bytes()
     except FileNotFoundError:
         raise Unreadable("no such file") from None
     except IsADirectoryError:
         raise Unreadable("is a directory; a scene is a TOML file") from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         raise Unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > most:
-        raise Unreadable(f"is larger than {most} bytes")
-    return bytes(content)
 
-
-#: Bytes of a file that is no table, at most.
-LARGEST = 50_000_000
-
-#: Tables and lists within each other, at most; the deepest that a scene has is six: rows with a matrix in a table.
-DEEPEST = 30
 
 _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
@@ -94,17 +74,15 @@ def read_toml(path: Path) -> dict[str, Any]:
         SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
     """
     try:
-        return tomllib.loads(read_bytes(path, LARGEST).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path).decode("utf-8-sig"))
     except Unreadable as error:
         reason = str(error)
     except UnicodeDecodeError as error:
         reason = f"not valid TOML: byte {error.start} is not UTF-8 text"
-    except tomllib.TOMLDecodeError as error:
-        reason = f"not valid TOML: {printable(str(error))}"
     except RecursionError:
-        reason = f"tables or lists are nested more than {DEEPEST} deep"
-    except ValueError as error:  # an integer of thousands of digits
-        reason = f"cannot be read: {printable(str(error))}"
+        reason = "not valid TOML: tables or lists are nested too deep"
+    except ValueError as error:  # a slip, or an integer of thousands of digits
+        reason = f"not valid TOML: {printable(str(error))}"
     raise SceneError(str(path), allowed=reason) from None
 
 
@@ -116,7 +94,7 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
     Raises:
         SceneError: it is not of the form `table.key=value`.
     """
-    key, equals, text = (part.strip() for part in encodable(override).partition("="))
+    key, equals, text = (part.strip() for part in override.partition("="))
     if not equals or not text or not _KEY.fullmatch(key):
         raise SceneError(file, allowed=f"override {show(override)} must have the form table.key=value")
     try:
@@ -130,44 +108,43 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 def set_keys(file: str, data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return a copy of nested tables with dotted keys set, one after the other, or removed if the value is None.
 
-    Missing tables on the way are created; raise a SceneError of the file where a part of a path is not a table.
+    Missing tables on the way are created; a number names an entry of a list, from 0. Raise a SceneError of the file
+    where a part of a path is neither a table nor an entry of a list.
     """
     for key, value in changes:
-        *parents, last = key.split(".")
-        data = table = dict(data)
-        for depth, parent in enumerate(parents, start=1):
-            below = table.get(parent, {})
-            if not isinstance(below, Mapping):
-                raise SceneError(file, ".".join(parents[:depth]), below, f"is not a table, so {key} cannot be set")
-            table[parent] = table = dict(below)
-        if value is None:
-            table.pop(last, None)
-        else:
-            table[last] = value
+        parts = key.split(".")
+        data = _set(file, data, key, parts, 0, value)
     return data
 
 
-def encodable(text: str) -> str:
-    """Return a text that UTF-8 can hold: what a command line gives in other bytes is shown as such."""
-    return text.encode("utf-8", "backslashreplace").decode()
+def _set(file: str, given: Any, key: str, parts: Sequence[str], depth: int, value: Any) -> Any:
+    """Return a copy of a table or list with what is at a path below it set."""
+    if depth == len(parts):
+        return value
+    part: Any = parts[depth]
+    if isinstance(given, list | tuple) and part.isdigit() and int(part) < len(given):
+        out: Any = list(given)
+        out[int(part)] = _set(file, out[int(part)], key, parts, depth + 1, value)
+        return out
+    if not isinstance(given, Mapping):
+        why = f"has no entry {part}" if isinstance(given, list | tuple) else "is not a table"
+        raise SceneError(file, ".".join(parts[:depth]), given, f"{why}, so {key} cannot be set")
+    out = dict(given)
+    below = _set(file, out.get(part, {}), key, parts, depth + 1, value)
+    if below is None:
+        out.pop(part, None)
+    else:
+        out[part] = below
+    return out
 
 
-def to_builtin(file: str, key: str, value: Any, depth: int = 0) -> Any:
-    """Return what stands at a key with NumPy arrays and numbers, at any depth, as lists and Python numbers.
-
-    Raise a SceneError of the file where tables and lists are nested deeper than a scene can be.
-    """
-    if depth > DEEPEST:
-        raise SceneError(file, key, allowed=f"is nested more than {DEEPEST} deep")
+def to_builtin(value: Any) -> Any:
+    """Return a value with NumPy arrays and numbers, at any depth, as lists and Python numbers."""
     if isinstance(value, Mapping):
-        return {encodable(str(name)): to_builtin(file, key, entry, depth + 1) for name, entry in value.items()}
+        return {str(name): to_builtin(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [to_builtin(file, key, entry, depth + 1) for entry in value]
-    if isinstance(value, str):
-        return encodable(value)
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value.item() if isinstance(value, np.generic) else value
+        return [to_builtin(entry) for entry in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
@@ -192,83 +169,58 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     return path
 
 
-#: What refuses rows, as `check_increasing` does.
-Check: TypeAlias = Callable[[Matrix, Any, str, Callable[[int], str]], None]
+def read_rows(value: Any, info: ValidationInfo) -> Any:
+    """Return the rows of the CSV file at a path, and any other value as it is."""
+    if not is_path(value):
+        return value
+    return read_table(existing_file(value, info))[1]
 
 
-def as_table(
-    value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, check: Check | None = None
-) -> Matrix:
-    """Return the rows of a table, or of the CSV file at a path, if they pass a check; messages name the line there."""
-    name: Callable[[int], str] = "row {}".format
-    if isinstance(value, str | Path):
-        path, text = table_text(value, info)
-        by_line = read_rows(text, path)
-        lines, value = tuple(by_line), tuple(by_line.values())
-
-        def name(row: int) -> str:
-            return f"line {lines[row - 1]}"
-
-    elif isinstance(value, list | tuple):
-        limits_in(info).check("rows", len(value), value=value)
-    rows = as_rows(value, columns, shape, name)
-    if check is not None:
-        check(rows, value, shape, name)
-    return rows
+def is_path(value: Any) -> bool:
+    """Return whether a value names a file: a text that is no number, with or without a unit."""
+    return isinstance(value, Path) or (isinstance(value, str) and not is_quantity(value) and number_in(value) is None)
 
 
-def table_text(value: Any, info: ValidationInfo) -> tuple[Path, str]:
-    """Return the path of a file that a scene names and its text, of no more rows than the scene's limits allow."""
-    path, limits = existing_file(value, info), limits_in(info)
-    text = read_text(path, 1600 * limits.rows)  # bytes: a row may have a 6×6 matrix in it
-    limits.check("rows", text.count("\n"), value=str(path))
-    return path, text
+#: An annotation of the type of rows: the path of a CSV file may stand in their place.
+FROM_FILE = BeforeValidator(read_rows)
 
 
-def read_text(path: Path, most: int) -> str:
-    """Return the text of a table of comma-separated columns; raise if it is none, or has more than `most` bytes."""
-    try:
-        text = read_bytes(path, most).decode("utf-8-sig")
-    except Unreadable as error:
-        raise problem("", str(path), f"cannot be read: {error}") from None
-    except UnicodeDecodeError as error:
-        raise problem("", str(path), f"cannot be read: byte {error.start} is not UTF-8 text") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
+    """Return the names of the columns, if the file has any, and the rows of a table of finite numbers in a CSV file.
 
-
-def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
-    """Return number of the line ↦ row of a table of finite numbers, all of one length.
-
-    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number. Raise if the text,
-    with lines ended by line feeds, holds anything else or nothing, naming the file at `path`, line and column.
+    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number. Raise if there is
+    anything else, or nothing, naming line and column.
     """
-    rows: dict[int, tuple[float, ...]] = {}
-    width, top = 0, 0  # columns of the first row, and its line
-    for number, line in enumerate(text.split("\n"), start=1):
-        cells = _cells(line)
-        if not cells:
+
+    def refused(reason: str) -> PydanticCustomError:
+        return problem("", str(path), reason)
+
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+    except Unreadable as error:
+        raise refused(str(error)) from None
+    except UnicodeDecodeError as error:
+        raise refused(f"cannot be read: byte {error.start} is not UTF-8 text") from None
+    header, rows, width, top = list[str](), list[tuple[float, ...]](), 0, 0  # columns of the first row, and its line
+    for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
+        if not (cells := _cells(line)):
             continue
         values = [number_in(cell) for cell in cells]
         if not top:
             width, top = len(cells), number
             if any(cells) and all(value is None for value in values):
+                header = cells
                 continue
         for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
             if value is None or not math.isfinite(value):
                 reason = f"line {number}, column {column}: {shown_cell(cell)} must be a finite number"
-                raise problem("", str(path), f"{reason} (only the first row may be a header, one without any number)")
+                raise refused(f"{reason} (only the first row may be a header, one without any number)")
         if len(cells) != width:
-            raise problem("", str(path), f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
-        rows[number] = tuple(value for value in values if value is not None)
+            raise refused(f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
+        rows.append(tuple(value for value in values if value is not None))
     if not rows:
-        raise problem("", str(path), "has no row of numbers")
-    return rows
-
-
-def read_header(text: str) -> list[str]:
-    """Return the cells of the first row, if none of them is a number; else nothing."""
-    first = next((cells for line in text.split("\n") if (cells := _cells(line))), [])
-    return first if all(number_in(cell) is None for cell in first) else []
+        raise refused("has no row of numbers")
+    return header, rows
 
 
 def _cells(line: str) -> list[str]:

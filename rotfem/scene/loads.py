@@ -1,20 +1,257 @@
-"""The [loads] table: gravity, and forces and moments at the tip, along the structure, and at places of it."""
+"""The [loads] table, and what else is given over time: constant, as a table, a function, or harmonic.
+
+Loads are gravity, and forces and moments at the tip, along the structure, and at places of it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal
+import inspect
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Field, PlainValidator, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_validator
 
 from rotfem.errors import SceneError
-from rotfem.scene.motion import Motion
-from rotfem.scene.signals import FORCE, MOMENT, PRESSURE, Harmonic, Kind, Signal, arguments
-from rotfem.scene.span_tables import is_path
-from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import Number, PaddedVector, as_number, as_vector, on_span
+from rotfem.scene.files import is_path, read_rows
+from rotfem.scene.table import SceneModel, in_units, problem, problems_at, unit
+from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, on_span
+
+
+def arguments(function: Callable[..., Any]) -> int:
+    """Return how many arguments a function must be given; 1 where that is unknown, or any number will do."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return 1
+    needed = sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty for p in parameters)
+    return needed or int(any(p.kind is p.VAR_POSITIONAL for p in parameters))
+
+
+def function_of(what: str, count: int = 1) -> BeforeValidator:
+    """Return what refuses all but Python functions of so many arguments; `what` says of which."""
+
+    def check(value: Any) -> Any:
+        if not callable(value) or arguments(value) != count:
+            raise problem("", value, f"must be a Python function of {what}")
+        return value
+
+    return BeforeValidator(check)
+
+
+TimeFunction = Annotated[Callable[[float], Any], function_of("the time t (s)")]
+
+#: A table, or a function in its place.
+Over: TypeAlias = Matrix | Callable[..., Any]
+
+
+@cache
+def _numbers(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def are_rows(value: Any) -> bool:
+    """Return whether a value is a list of lists."""
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], list | tuple)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the vectors of a signal are.
+
+    Attributes:
+        unit: of their components.
+        sizes: numbers of components that are allowed.
+        padded: number of components that vectors are filled up to with zeros.
+    """
+
+    unit: str
+    sizes: tuple[int, ...]
+    padded: int = 0
+
+    def vector(self, value: Any) -> tuple[float, ...]:
+        """Return components; raise if they are none. A number will do where one is allowed."""
+        value = in_units(value, [self.unit])
+        one = 1 in self.sizes and not isinstance(value, list | tuple)
+        if not one and not isinstance(value, list | tuple):
+            raise problem("", value, f"must be a list of {self._sizes} numbers")
+        return self._filled(_numbers(tuple[Number, ...]).validate_python([value] if one else value))
+
+    def rows(self, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
+        """Return rows (what they are over, components), or the function of the same that stands in their place."""
+        if callable(value):
+            if arguments(value) != len(over):
+                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
+                needed = f"f({', '.join(over).replace('x', places)})"
+                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
+            function: Callable[..., Any] = value
+            return function
+        given = in_units(read_rows(value, info), [self.unit], [OVER_UNITS[name] for name in over])
+        n, table = len(over), _numbers(Rows).validate_python(given)
+        for i, row in enumerate(table, start=1):
+            if len(row) != len(table[0]) or len(row) - n not in self.sizes:
+                shape = f"rows [{', '.join(over)}, …] of {self._sizes} components each"
+                raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries")
+        return tuple((*row[:n], *self._filled(row[n:])) for row in CHECKS[over](table))
+
+    @property
+    def _sizes(self) -> str:
+        return " or ".join(map(str, self.sizes))
+
+    def _filled(self, vector: tuple[float, ...]) -> tuple[float, ...]:
+        if len(vector) not in self.sizes:
+            raise problem("", list(vector), f"must be a list of {self._sizes} numbers")
+        return (*vector, *(0.0,) * (self.padded - len(vector)))
+
+
+ACCELERATION = Kind("m/s**2", (2, 3), padded=3)
+FORCE = Kind("N", (2, 3), padded=3)
+MOMENT = Kind("N*m", (1, 3))
+PRESSURE = Kind("Pa", (1,))
+
+
+def check_span(rows: Matrix) -> Matrix:
+    """Return rows (x, …); refuse x (m) that decreases, or does not change; one x may stand in two of them: a jump."""
+    x = [row[0] for row in rows]
+    if len(rows) < 2 or x[0] == x[-1]:
+        raise problem("", None, "must have at least two rows at different x")
+    for i, (before, after) in enumerate(pairwise(x), start=2):
+        if after < before:
+            raise problem("", None, f"the first column must not decrease; row {i}: {after:g} < {before:g}")
+    place, times = Counter(x).most_common(1)[0]
+    if times > 2:
+        raise problem("", None, f"x = {place:g} stands in {times} rows; must be in one, or in two, where it jumps")
+    return rows
+
+
+def check_grid(rows: Matrix) -> Matrix:
+    """Return rows (x, t, …); refuse them unless every x (m), at least two, stands once with every t (s)."""
+    found = Counter((x, t) for x, t, *_ in rows)
+    (x, t), times = found.most_common(1)[0] if found else ((0.0, 0.0), 0)
+    if times > 1:
+        raise problem("", None, f"{times} rows give x = {x:g}, t = {t:g}")
+    stations, moments = (sorted({pair[k] for pair in found}) for k in (0, 1))
+    if len(stations) < 2 or len(moments) < 2:
+        raise problem("", None, "must have at least two x and two t")
+    missing = next(((x, t) for x in stations for t in moments if (x, t) not in found), None)
+    if missing is not None:
+        raise problem("", None, f"has no row for x = {missing[0]:g}, t = {missing[1]:g}; must have every t at every x")
+    return rows
+
+
+#: What a table is over ↦ what checks its rows.
+CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {
+    ("t",): check_increasing,
+    ("x",): check_span,
+    ("x", "t"): check_grid,
+}
+
+#: Key of a table ↦ what its rows are over, and the units of that.
+OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
+OVER_UNITS = {"t": "s", "x": "m"}
+
+
+class Harmonic(SceneModel):
+    """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
+
+    Attributes:
+        amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
+        frequency: angular frequency (rad/s), or `per_rev`.
+        per_rev: periods in a revolution of the hub.
+        phase: by which it is ahead at t = 0 or ψ = 0 (rad).
+    """
+
+    amplitude: Any
+    frequency: Annotated[Positive, unit("rad/s")] | None = None
+    per_rev: Positive | None = None
+    phase: Annotated[Number, unit("rad")] = 0.0
+
+    def _check(self) -> None:
+        if (self.frequency is None) == (self.per_rev is None):
+            raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
+
+
+class Given(SceneModel):
+    """A quantity that is given in one of several ways.
+
+    In a scene it may be written without its table: a value, a table (rows, or the path of a CSV file), or a function.
+    """
+
+    #: Its keys of which exactly one is given.
+    WAYS: ClassVar[tuple[str, ...]]
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The keys by which it is given."""
+        return tuple(name for name in self.WAYS if getattr(self, name) is not None)
+
+    @classmethod
+    def _table(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            one = isinstance(data.get("harmonic"), Mapping | Harmonic)
+            return {**data, "harmonic": [data["harmonic"]]} if one else data
+        if callable(data):
+            return {"function": data}
+        return {"table" if are_rows(data) or is_path(data) else "value": data}
+
+    def _check(self) -> None:
+        harmonic = getattr(self, "harmonic", None)
+        if len(self.given) > 1 or not (self.given or harmonic):
+            ways = ", ".join(name for name in self.WAYS if name != "function")
+            added = "" if harmonic is None else "; harmonic may be given in addition"
+            raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}{added}")
+
+
+class Signal(Given):
+    """A vector over time; one with two components gets a third one, zero.
+
+    Attributes:
+        value: constant components, or None.
+        table: rows (t, components), linear between them and constant outside, or None.
+        function: Python function t (s) ↦ components, or None.
+    """
+
+    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
+    VECTORS: ClassVar[Kind] = ACCELERATION
+
+    value: tuple[float, ...] | None = None
+    table: Matrix | None = None
+    function: TimeFunction | None = None
+
+    @field_validator("value", mode="plain")
+    @classmethod
+    def _read_value(cls, value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
+        return None if value is None else cls._kind(info).vector(value)
+
+    @field_validator(*OVER, mode="plain", check_fields=False)
+    @classmethod
+    def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
+        return None if value is None else cls._kind(info).rows(OVER[str(info.field_name)], value, info)
+
+    @classmethod
+    def _kind(cls, info: ValidationInfo) -> Kind:
+        return cls.VECTORS
+
+    @property
+    def over(self) -> tuple[tuple[str, ...], Any]:
+        """What it is over, ("t",), ("x",) or ("x", "t"), () of one value, and that, or rows or a function; or None."""
+        name = next(iter(self.given), "value")
+        return {"function": ("t",), **OVER}.get(name, ()), getattr(self, name)
+
+    @property
+    def vectors(self) -> Iterator[tuple[float, ...]]:
+        """The value, or the rows without what they are over; none of a function."""
+        over, given = self.over
+        if isinstance(given, tuple):
+            yield from (row[len(over) :] for row in (given if over else [given]))
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the third component of all vectors is zero."""
+        return not any(vector[2] for vector in self.vectors if len(vector) > 2)
 
 
 class Load(Signal):
@@ -41,10 +278,8 @@ class Load(Signal):
     def _read_harmonics(cls, given: tuple[Harmonic, ...], info: ValidationInfo) -> tuple[Harmonic, ...]:
         out = []
         for i, part in enumerate(given):
-            try:
+            with problems_at(f"{i}.amplitude", part.amplitude):
                 out.append(part.model_copy(update={"amplitude": cls._read_amplitude(part.amplitude, info)}))
-            except PydanticCustomError as error:
-                raise problem(f"{i}.amplitude", part.amplitude, error.message()) from None
         return tuple(out)
 
     @classmethod
@@ -96,9 +331,8 @@ class SpanLoad(Load):
 
     @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        rows = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
         kind = cls._kind(info)
-        return kind.rows(("x",), value, info) if rows or is_path(value) else kind.vector(value)
+        return kind.rows(("x",), value, info) if are_rows(value) or is_path(value) else kind.vector(value)
 
     @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
@@ -131,11 +365,16 @@ class Pressure(SpanLoad):
     WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
     VECTORS: ClassVar[Kind] = PRESSURE
 
-    regions: dict[str, Annotated[Number, Unit("Pa")]] | None = None
+    regions: dict[str, Annotated[Number, unit("Pa")]] | None = None
 
 
-def _as_place(value: Any) -> tuple[float, ...]:
-    return as_vector(value, (2,)) if isinstance(value, list | tuple) else (as_number(value),)
+#: A place along a beam, or (x, y) on a plate.
+Place = Annotated[
+    tuple[Number, ...],
+    Field(max_length=2),
+    BeforeValidator(lambda given: given if isinstance(given, list | tuple) else (given,)),
+    unit("m"),
+]
 
 
 class PointLoad(SceneModel):
@@ -148,16 +387,10 @@ class PointLoad(SceneModel):
         kind: "dead" or "follower", of both where they do not say it themselves.
     """
 
-    x: Annotated[tuple[float, ...], PlainValidator(_as_place), Unit("m")] = Field(
-        description="a place along the beam (m), or [x, y] on a plate"
-    )
+    x: Place
     force: Load | None = None
     moment: MomentLoad | None = None
     kind: Literal["dead", "follower"] = "dead"
-
-    def kind_of(self, load: Load) -> str:
-        """Return the kind of one of the two."""
-        return load.kind if "kind" in load.model_fields_set else self.kind
 
     def _check(self) -> None:
         if self.force is None and self.moment is None:
@@ -177,7 +410,7 @@ class Loads(SceneModel):
         at: forces and moments at places of the structure.
     """
 
-    gravity: Annotated[PaddedVector, Unit("m/s**2")] = (0.0, 0.0, 0.0)
+    gravity: Annotated[PaddedVector, unit("m/s**2")] = (0.0, 0.0, 0.0)
     tip_force: Load | None = None
     tip_moment: MomentLoad | None = None
     distributed: SpanLoad | None = None
@@ -185,26 +418,27 @@ class Loads(SceneModel):
     pressure: Pressure | None = None
     at: tuple[PointLoad, ...] = ()
 
-    @property
-    def named(self) -> dict[str, Load]:
-        """All that are given, by name: "tip_force", …, "at.0.force", "at.0.moment"."""
-        names = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
-        given = {name: getattr(self, name) for name in names}
+    def named(self) -> Iterator[tuple[str, Load, str]]:
+        """Yield name, load and kind of all that are given: "tip_force", …, "at.0.force", "at.0.moment"."""
+        for name in type(self).model_fields:
+            if isinstance(load := getattr(self, name), Load):
+                yield name, load, load.kind
         for i, point in enumerate(self.at):
-            given |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
-        return {name: load for name, load in given.items() if load is not None}
+            for name, load in (("force", point.force), ("moment", point.moment)):
+                if load is not None:
+                    yield f"at.{i}.{name}", load, load.kind if "kind" in load.model_fields_set else point.kind
 
 
 # --- checks against what the loads work on ------------------------------------------------------------------------
 
 
-def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
-    """Refuse loads that the structure cannot bear, and what its motion does not have."""
+def check_loads(structure: Any, free_hub: bool, loads: Loads) -> None:
+    """Refuse loads that the structure cannot bear, and what a free hub does not have."""
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
-    for name, load in loads.named.items():
+    for name, load, _ in loads.named():
         key = f"loads.{name}"
         if load.VECTORS.sizes == MOMENT.sizes:
             _check_moment(key, structure, load)
@@ -214,7 +448,7 @@ def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
                     key, None, f"x = {x:.10g} is not on the structure, which runs from 0 to {structure.length:g}"
                 )
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
-        if motion.is_free and per_rev is not None:
+        if free_hub and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
             raise problem(f"{key}.harmonic.per_rev", per_rev, why)
     _check_regions(structure, loads.pressure)
@@ -258,7 +492,7 @@ def check_tables(file: str, structure: Any, loads: Loads, when: str) -> None:
 
     In a history such a table is over time unless it runs from 0 to the length.
     """
-    for name, load in loads.named.items():
+    for name, load, _ in loads.named():
         if not isinstance(load, SpanLoad) or load.table is None:
             continue
         why = None

@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Field, StrictBool
 
-from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
-from rotfem.scene.signals import Signal, TimeFunction, function_of, time_table
-from rotfem.scene.table import SceneModel, Unit, problem
+from rotfem.scene.loads import Signal, TimeFunction, function_of
+from rotfem.scene.table import SceneModel, one_of, problem, unit
 from rotfem.scene.values import (
     Matrix,
     NonNegative,
     Number,
     Positive,
-    Vector3,
+    TimeTable,
+    Vector,
     WithParameters,
-    as_rows,
-    as_vector3,
-    such,
 )
 
-Speed = Annotated[Number, Unit("rad/s")]
-Axis = Annotated[Vector3, such(as_vector3, any, "must be a direction; not all three components can be 0")]
+
+def _any(axis: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(axis):
+        raise problem("", None, "must be a direction; not all three components can be 0")
+    return axis
 
 
-def _as_pulses(value: Any) -> Matrix:
-    rows = as_rows(value, (3,), "a list of pulses [[start, end, torque], …]")
-    for i, (start, end, _) in enumerate(rows, start=1):
+def _check_pulses(pulses: Matrix) -> Matrix:
+    for i, (start, end, _) in enumerate(pulses, start=1):
         if end <= start:
-            raise problem("", value, f"pulse {i} must end after it starts; it runs from {start:g} to {end:g} s")
-    return rows
+            raise problem("", None, f"pulse {i} must end after it starts; it runs from {start:g} to {end:g} s")
+    return pulses
+
+
+Speed = Annotated[Number, unit("rad/s")]
+Pulses = Annotated[tuple[Vector, ...], Field(min_length=1), AfterValidator(_check_pulses), unit("s", "s", "N*m")]
 
 
 class Motion(SceneModel):
@@ -49,18 +52,8 @@ class Motion(SceneModel):
     #: Whether the hub is free, its angle an unknown.
     is_free: ClassVar[bool] = False
 
-    axis: Axis = (0.0, 0.0, 1.0)
+    axis: Annotated[Vector, AfterValidator(_any)] = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        """Refuse keys of other types of motion, by their types."""
-        if data.get("type") in BUILT_IN:
-            for key in (key for key in data if key not in cls.model_fields):
-                if types := [show(table.name) for table in _TABLES if key in table.model_fields]:
-                    why = f"has no meaning with type = {show(data['type'])}; it belongs to type = {', '.join(types)}"
-                    raise problem(key, data[key], why)
-        return data
 
 
 class ConstantMotion(Motion):
@@ -73,7 +66,7 @@ class ConstantMotion(Motion):
     name: ClassVar[str] = "constant"
     is_steady: ClassVar[bool] = True
     type: Literal["constant"]
-    speed: Speed = Field(description="a number (rad/s)")
+    speed: Speed
 
 
 class SpinUpMotion(Motion):
@@ -86,8 +79,8 @@ class SpinUpMotion(Motion):
 
     name: ClassVar[str] = "spin_up"
     type: Literal["spin_up"]
-    speed: Speed = Field(description="a number (rad/s)")
-    duration: Annotated[Positive, Unit("s")] = Field(description="a number greater than 0 (s)")
+    speed: Speed
+    duration: Annotated[Positive, unit("s")]
 
 
 class TableMotion(Motion):
@@ -100,9 +93,7 @@ class TableMotion(Motion):
 
     name: ClassVar[str] = "table"
     type: Literal["table"]
-    table: Annotated[Matrix, time_table("speed"), Unit("rad/s", ("s",))] = Field(
-        description="a table [[t, speed], …] or the path of a CSV file"
-    )
+    table: Annotated[TimeTable, unit("rad/s", over=("s",))]
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
 
 
@@ -123,12 +114,12 @@ class TorqueMotion(Motion):
     name: ClassVar[str] = "torque"
     is_free: ClassVar[bool] = True
     type: Literal["torque"]
-    hub_inertia: Annotated[Positive, Unit("kg*m**2")] = Field(description="a number greater than 0 (kg·m²)")
-    pulses: Annotated[Matrix, PlainValidator(_as_pulses), Unit(("s", "s", "N*m"))] | None = None
-    table: Annotated[Matrix, time_table("torque"), Unit("N*m", ("s",))] | None = None
+    hub_inertia: Annotated[Positive, unit("kg*m**2")]
+    pulses: Pulses | None = None
+    table: Annotated[TimeTable, unit("N*m", over=("s",))] | None = None
     function: Annotated[Callable[..., float], function_of("(t, psi, psi_dot, tip)", 4)] | None = None
-    coupled: Annotated[bool, Field(strict=True)] = True
-    hub_damping: Annotated[NonNegative, Unit("N*m*s")] = 0.0
+    coupled: StrictBool = True
+    hub_damping: Annotated[NonNegative, unit("N*m*s")] = 0.0
     speed: Speed = 0.0
 
     def _check(self) -> None:
@@ -149,7 +140,7 @@ class CallableMotion(Motion):
 
     name: ClassVar[str] = "callable"
     type: Literal["callable"]
-    speed: TimeFunction = Field(description="a Python function of the time t (s)")
+    speed: TimeFunction
     rate: TimeFunction | None = None
     angle: TimeFunction | None = None
 
@@ -177,21 +168,7 @@ _TABLES = (ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion, CallableMoti
 for _table in _TABLES:
     register(_table)
 
-#: Types of motion that have a table of their own.
-BUILT_IN = tuple(table.name for table in _TABLES)
-
-
-def _tag(value: Any) -> str:
-    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
-    return kind if kind in BUILT_IN else "law"
-
-
-AnyMotion = Annotated[
-    Annotated[ConstantMotion, Tag("constant")]
-    | Annotated[SpinUpMotion, Tag("spin_up")]
-    | Annotated[TableMotion, Tag("table")]
-    | Annotated[TorqueMotion, Tag("torque")]
-    | Annotated[CallableMotion, Tag("callable")]
-    | Annotated[LawMotion, Tag("law")],
-    Discriminator(_tag),
-]
+if TYPE_CHECKING:
+    AnyMotion = ConstantMotion | SpinUpMotion | TableMotion | TorqueMotion | CallableMotion | LawMotion
+else:
+    AnyMotion = Annotated[Any, one_of({table.name: table for table in _TABLES}, LawMotion)]

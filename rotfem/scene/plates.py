@@ -3,58 +3,38 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PlainValidator
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import Unit, Way, along, choose_way, problem, problems_at
+from rotfem.scene.table import Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
     Array,
-    Bounds,
-    Matrix,
     NonNegative,
     Number,
     PoissonRatio,
     Positive,
-    Profile,
     ShearCorrection,
-    Taper,
+    Tapered,
     Vector,
-    as_rows,
-    check_magnitudes,
     check_profile_length,
+    check_start,
     evaluate,
     on_span,
 )
 
-
-def _as_thickness(value: Any) -> Profile | dict[str, float]:
-    positive = Bounds(gt=0.0)
-    if isinstance(value, dict):
-        if not value:
-            raise problem("", value, "must give a thickness for every region")
-        for region, thickness in value.items():
-            with problems_at(str(region), thickness):
-                positive.number(thickness)
-        return {str(region): float(thickness) for region, thickness in value.items()}
-    return positive.profile(value, anywhere=True)  # a mesh may lie anywhere
+#: A number, a taper (of a mesh from anywhere), or region ↦ number.
+Thickness = Annotated[
+    Annotated[Tapered[Positive], Tag("<profile>")]
+    | Annotated[dict[str, Positive], Tag("<table>"), Field(min_length=1)],
+    Discriminator(lambda value: "<table>" if isinstance(value, dict) else "<profile>"),
+]
 
 
-def _as_point_masses(value: Any) -> Matrix:
-    if isinstance(value, list | tuple) and not value:
-        return ()
-    rows = as_rows(value, (3,), "a list of point masses [[x, y, m], …]")
-    for i, (_, _, mass) in enumerate(rows, start=1):
-        if mass <= 0.0:
-            raise problem("", value, f"the mass of row {i} must be greater than 0")
-    return rows
-
-
-Modulus = Annotated[Positive, Unit("Pa")]
+Modulus = Annotated[Positive, unit("Pa")]
 
 
 class PlateStructure(StructureTable):
@@ -88,12 +68,10 @@ class PlateStructure(StructureTable):
     )
 
     type: Literal["plate"] = "plate"
-    length: Annotated[Positive, Unit("m")] | None = None
-    width: Annotated[Positive, Unit("m")] | None = None
-    mesh: Annotated[str, PlainValidator(lambda value, info: str(existing_file(value, info)))] | None = None
-    thickness: Annotated[float | Taper | dict[str, float], PlainValidator(_as_thickness), along("m")] = Field(
-        description="a number greater than 0 (m), a taper [[x, thickness], …], or with a mesh a table of regions"
-    )
+    length: Annotated[Positive, unit("m")] | None = None
+    width: Annotated[Positive, unit("m")] | None = None
+    mesh: Annotated[str, BeforeValidator(lambda value, info: str(existing_file(value, info)))] | None = None
+    thickness: Annotated[Thickness, along("m")]
     E: Modulus | None = None
     nu: PoissonRatio | None = None
     E1: Modulus | None = None
@@ -102,13 +80,13 @@ class PlateStructure(StructureTable):
     G12: Modulus | None = None
     G13: Modulus | None = None
     G23: Modulus | None = None
-    rho: Annotated[Positive, Unit("kg/m**3")] = Field(description="a number greater than 0 (kg/m³)")
+    rho: Annotated[Positive, unit("kg/m**3")]
     shear_correction: ShearCorrection = 5.0 / 6.0
-    hub_radius: Annotated[NonNegative, Unit("m")] = 0.0
-    hub_offset: Annotated[Vector, Unit("m")] | None = None
-    point_masses: Annotated[Matrix, PlainValidator(_as_point_masses), Unit(("m", "m", "kg"))] = ()
-    line_masses: dict[str, Annotated[Positive, Unit("kg/m")]] = Field(default_factory=dict)
-    damping: Damping = Damping()
+    hub_radius: Annotated[NonNegative, unit("m")] = 0.0
+    hub_offset: Annotated[Vector, unit("m")] | None = None
+    point_masses: Annotated[tuple[tuple[Number, Number, Positive], ...], unit("m", "m", "kg")] = ()
+    line_masses: dict[str, Annotated[Positive, unit("kg/m")]] = Field(default_factory=dict)
+    damping: Damping = empty()
 
     @property
     def mesh_file(self) -> str | None:
@@ -146,8 +124,8 @@ class PlateStructure(StructureTable):
         if isinstance(self.thickness, dict) and geometry.name != "mesh":
             raise problem("thickness", self.thickness, "thickness by region needs a mesh")
         if isinstance(self.thickness, tuple) and self.length is not None:
-            if self.thickness[0][0] != 0.0:
-                raise problem("thickness", self.thickness, "the taper must start at x = 0")
+            with problems_at("thickness", self.thickness):
+                check_start(self.thickness)
             check_profile_length("thickness", self.thickness, self.length)
         for x, _, _ in self.point_masses:
             if not on_span(x, self.length):
@@ -157,21 +135,6 @@ class PlateStructure(StructureTable):
             limit = math.sqrt(self.E1 / self.E2)
             if abs(self.nu12) >= limit:
                 raise problem("nu12", self.nu12, f"must be less than √(E1/E2) = {limit:g} in size, else not stable")
-        check_magnitudes(self._stiffnesses, "thickness")
-
-    def _stiffnesses(self) -> dict[str, Array]:
-        """Return membrane and bending stiffnesses (N/m, N·m) and the mass per area (kg/m²) at all given thicknesses."""
-        given = self.thickness
-        rows = given if isinstance(given, dict) else dict(given) if isinstance(given, tuple) else {"": given}
-        h = np.array(list(rows.values()))
-        moduli = {name: getattr(self, name) for name in ("E", "E1", "E2", "G12", "G13", "G23")}
-        stiffnesses = {
-            f"{name}{of}": value * h**power
-            for name, value in moduli.items()
-            if value is not None
-            for of, power in ((" h", 1), (" h³", 3))
-        }
-        return {**stiffnesses, "mass per area": self.rho * h, "rotary inertia": self.rho * h**3}
 
     def _way(self, ways: tuple[Way, ...]) -> Way:
         names = dict.fromkeys(key for way in ways for key in (*way.required, *way.optional))

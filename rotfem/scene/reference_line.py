@@ -11,22 +11,21 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.scene.table import problem
-from rotfem.scene.values import Array, Matrix, as_rows
+from rotfem.scene.values import Array, Matrix
 
 #: Gauss points for the arc length between two points: the speed along a cubic is smooth there.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
-def as_line(value: Any) -> Matrix:
-    """Return points (x, y, z) in m, the first of them the clamp (0, 0, 0); raise on anything else.
+def as_line(rows: Matrix) -> Matrix:
+    """Return points (x, y, z) in m; refuse them unless the first is the clamp (0, 0, 0), and they follow a line.
 
     Two equal rows are a kink; three are refused, and so are rows that leave nothing between two kinks.
     """
-    rows = as_rows(value, (3,), "points [[x, y, z], …]")
-    if rows[0] != (0.0, 0.0, 0.0):
-        raise problem("", list(rows[0]), "the line must start at the clamp, [0, 0, 0]; hub_offset says where that is")
     if len(set(rows)) < 2 or rows[0] == rows[1] or rows[-1] == rows[-2]:
         raise problem("", None, "must be points [[x, y, z], …], at least two, and no kink at an end")
+    if rows[0] != (0.0, 0.0, 0.0):
+        raise problem("", list(rows[0]), "the line must start at the clamp, [0, 0, 0]; hub_offset says where that is")
     for number, (a, b, c) in enumerate(zip(rows, rows[1:], rows[2:], strict=False), start=1):
         if a == b == c:
             raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import BeforeValidator, Field, StrictBool
 
-from rotfem.scene.signals import Given, Harmonic, TimeFunction, time_table
-from rotfem.scene.table import SceneModel, Unit, problem
-from rotfem.scene.values import Bounds, Matrix, NonNegative, Number, as_rows
+from rotfem.scene.loads import Given, Harmonic, TimeFunction
+from rotfem.scene.table import SceneModel, problem, unit
+from rotfem.scene.values import Matrix, NonNegative, Number, TimeTable
 
 
 class HarmonicAngle(Harmonic):
     """A harmonic part of an angle."""
 
-    amplitude: Annotated[Number, Unit("rad")] = Field(description="a number (rad)")
+    amplitude: Annotated[Number, unit("rad")]
 
 
 class PitchAngle(Given):
@@ -34,8 +34,8 @@ class PitchAngle(Given):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
-    value: Annotated[Number, Unit("rad")] | None = None
-    table: Annotated[Matrix, time_table("angle"), Unit("rad", ("s",))] | None = None
+    value: Annotated[Number, unit("rad")] | None = None
+    table: Annotated[TimeTable, unit("rad", over=("s",))] | None = None
     function: TimeFunction | None = None
     rate: TimeFunction | None = None
     harmonic: tuple[HarmonicAngle, ...] = ()
@@ -65,8 +65,8 @@ class Hinge(NamedTuple):
     damping: float
 
 
-Spring = Annotated[NonNegative, Unit("N*m")]
-Damper = Annotated[NonNegative, Unit("N*m*s")]
+Spring = Annotated[NonNegative, unit("N*m")]
+Damper = Annotated[NonNegative, unit("N*m*s")]
 
 
 class Root(SceneModel):
@@ -83,7 +83,7 @@ class Root(SceneModel):
 
     lag_stiffness: Spring | None = None
     lag_damping: Damper = 0.0
-    hinge_offset: Annotated[NonNegative, Unit("m")] = 0.0
+    hinge_offset: Annotated[NonNegative, unit("m")] = 0.0
 
     @property
     def hinges(self) -> dict[int, Hinge]:
@@ -117,8 +117,8 @@ class SpatialRoot(Root):
     flap_damping: Damper = 0.0
     pitch_stiffness: Spring | None = None
     pitch_damping: Damper = 0.0
-    pitch: PitchAngle = PitchAngle(value=0.0)
-    driven: bool = False
+    pitch: PitchAngle = Field(default_factory=lambda: cast(Any, 0.0), validate_default=True)
+    driven: StrictBool = False
 
     def check(self, precone: float) -> None:
         """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid.
@@ -136,15 +136,13 @@ class SpatialRoot(Root):
                 raise problem(f"root.{missing}_stiffness", None, why)
 
 
-def _as_two_by_two(value: Any) -> Matrix:
-    """Return a matrix of two rows with a diagonal ≥ 0; a number stands for that times the identity."""
-    if not isinstance(value, list | tuple):
-        number = Bounds(ge=0.0).number(value)
-        return (number, 0.0), (0.0, number)
-    rows = as_rows(value, (2,), "a number or two rows [[yy, yz], [zy, zz]]")
-    if len(rows) != 2 or rows[0][0] < 0.0 or rows[1][1] < 0.0:
-        raise problem("", value, "must be a number ≥ 0 or [[yy, yz], [zy, zz]] with yy ≥ 0 and zz ≥ 0")
-    return rows
+def _isotropic(value: Any) -> Any:
+    """Return that times the identity of a number."""
+    return value if isinstance(value, list | tuple) else ((value, 0.0), (0.0, value))
+
+
+#: yy and zz are at least 0; a number stands for that times the identity.
+TwoByTwo = Annotated[tuple[tuple[NonNegative, Number], tuple[Number, NonNegative]], BeforeValidator(_isotropic)]
 
 
 class Support(SceneModel):
@@ -158,9 +156,9 @@ class Support(SceneModel):
         damping: of the damper (N·s/m), likewise.
     """
 
-    x: Annotated[Number, Unit("m")] = Field(description="a place along the beam (m)")
-    stiffness: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
-    damping: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
+    x: Annotated[Number, unit("m")]
+    stiffness: Annotated[TwoByTwo, unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
+    damping: Annotated[TwoByTwo, unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
 
     def _check(self) -> None:
         if not np.any(self.stiffness) and not np.any(self.damping):

@@ -9,22 +9,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
-from pydantic import BaseModel, Discriminator, Field, PlainValidator, PrivateAttr, Tag, ValidationError, ValidationInfo
+from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, encodable, noted_files, read_toml, set_keys, to_builtin
+from rotfem.scene.files import apply_overrides, noted_files, read_toml, set_keys, to_builtin
 from rotfem.scene.loads import Loads, check_loads, check_tables
 from rotfem.scene.motion import AnyMotion, Motion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.structure import designed
-from rotfem.scene.table import SceneModel, Unit, problem, scene_error
-from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
+from rotfem.scene.table import SceneModel, empty, problem, scene_error, unit
+from rotfem.scene.values import ROUND_OFF, Matrix
 from rotfem.short import short
 from rotfem.units import unit_of
 
@@ -47,16 +47,23 @@ def abridged(value: Any, given: Any) -> Any:
 
 
 #: A relative error that may be asked for, and CPU seconds that it may take.
-Accuracy = Annotated[float, PlainValidator(Bounds(ge=1e-8, le=0.5).number)]
-Budget = Annotated[float, PlainValidator(Bounds(gt=0, le=1e9).number), Unit("s")]
+Accuracy = Annotated[float, Field(strict=True, ge=1e-8, le=0.5)]
+Budget = Annotated[float, Field(strict=True, gt=0, le=1e9), unit("s")]
 
 
-class _PlateTable(dict[str, Any]):
-    """Marks the mesh table of a plate, whose keys differ from those of a beam."""
+def _as_mesh(value: Any, info: ValidationInfo) -> BeamMesh | PlateMesh:
+    """Return the mesh of the structure's type."""
+    structure = info.data.get("structure")
+    kind = (info.context or {}).get("type") or getattr(structure, "type", None)
+    table = PlateMesh if kind == "plate" else BeamMesh
+    mesh: BeamMesh | PlateMesh = table.model_validate(value, context=info.context)
+    return mesh if structure is None else mesh.suited(structure)
 
 
-def _mesh_tag(value: Any) -> str:
-    return "plate" if isinstance(value, _PlateTable | PlateMesh) else "beam"
+if TYPE_CHECKING:
+    Mesh = BeamMesh | PlateMesh
+else:
+    Mesh = Annotated[Any, PlainValidator(_as_mesh)]
 
 
 class Scene(SceneModel):
@@ -73,7 +80,6 @@ class Scene(SceneModel):
         modes: what modes to compute.
         solver: settings of Newton's method.
         output: what to compute in addition to what is always recorded.
-        limits: how much may be asked for.
         extensions: Python files that register what the scene names.
         accuracy: wanted error, relative to the largest displacement of the tip, or to each frequency; theory, mesh,
             scheme and step follow from it.
@@ -81,18 +87,21 @@ class Scene(SceneModel):
         accuracy_budget: limit of the CPU time (s) of all answers together; none by default.
     """
 
-    structure: Structure = Field(description="a table [structure]")
-    motion: AnyMotion = Field(description="a table [motion]")
-    model: Model = Model()
-    initial: Initial = Initial()
-    loads: Loads = Loads()
-    mesh: Annotated[Annotated[BeamMesh, Tag("beam")] | Annotated[PlateMesh, Tag("plate")], Discriminator(_mesh_tag)]
+    GONE: ClassVar[Mapping[str, str]] = {
+        "limits": "leave it out: only memory is limited, by the environment variable ROTFEM_MEMORY (GB)"
+    }
+
+    structure: Structure
+    motion: AnyMotion
+    model: Model = empty()
+    initial: Initial = empty()
+    loads: Loads = empty()
+    mesh: Mesh = empty()
     time: Time | None = None
-    modes: Modes = Modes()
-    solver: Solver = Solver()
-    output: OutputTable = OutputTable()
-    limits: Limits = Limits()
-    extensions: Extensions = Extensions()
+    modes: Modes = empty()
+    solver: Solver = empty()
+    output: OutputTable = empty()
+    extensions: Extensions = empty()
     accuracy: Accuracy | None = None
     accuracy_of: Literal["tip", "root_moment", "frequencies"] | None = None
     accuracy_budget: Budget | None = None
@@ -120,7 +129,10 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
-        tables = {encodable(str(key)): to_builtin(file, str(key), value) for key, value in data.items()}
+        try:
+            tables = to_builtin(data)
+        except RecursionError:
+            raise SceneError(file, allowed="tables or lists are nested too deep") from None
         with noted_files() as extensions:
             load_wanted(tables, file, directory)
         given = tables.get("motion")
@@ -128,7 +140,7 @@ class Scene(SceneModel):
         whole, hints = designed(tables, file), list[str]()
         structure = whole.get("structure")
         kind = structure.get("type") if isinstance(structure, Mapping) else None
-        context = {"directory": directory, "limits": limits_of(whole), "accuracy": whole.get("accuracy"), "type": kind}
+        context = {"directory": directory, "accuracy": whole.get("accuracy"), "type": kind}
         try:
             with noted_files() as files:
                 scene = cls.model_validate(whole, context={**context, "hints": hints})
@@ -194,9 +206,8 @@ class Scene(SceneModel):
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = plain(self)
-        for name in ("output", "limits", "extensions"):
-            if getattr(self, name) == type(self).model_fields[name].default:
-                del tables[name]
+        for name in {"output", "extensions"} - self.model_fields_set:
+            del tables[name]
         if self.structure.mesh_file is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
@@ -235,14 +246,7 @@ class Scene(SceneModel):
         """
         check_tables(self._file, self.structure, self.loads, when)
 
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        structure, mesh = data.get("structure"), data.get("mesh", {})
-        is_plate = structure.get("type") == "plate" if isinstance(structure, Mapping) else False
-        return {**data, "mesh": _PlateTable(mesh) if is_plate and isinstance(mesh, Mapping) else mesh}
-
     def _check(self) -> None:
-        vars(self)["mesh"] = self.mesh.suited(self.structure)
         check_together(self)
 
 
@@ -309,12 +313,11 @@ def check_together(scene: Scene) -> None:
         check_planar(motion, scene.loads)
     if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
         raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
-    check_loads(structure, motion, scene.loads)
+    check_loads(structure, motion.is_free, scene.loads)
     check_mesh(structure, scene.mesh)
     check_theory(structure, model)
     check_frame(structure, motion, model)
     check_initial(structure, motion, model, scene.initial)
-    check_limits(scene)
     check_accuracy(scene)
     scene.output.check(structure.type, structure.length)
 
@@ -324,7 +327,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS.padded}
+    vectors |= {f"loads.{name}": load for name, load, _ in loads.named() if load.VECTORS.padded}
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
             value = list(signal.value) if signal.value is not None else None
@@ -426,16 +429,6 @@ def _check_velocity(structure: Any, rows: Matrix) -> None:
         why = "the third component must be 0 for a planar_beam"
     if why is not None:
         raise problem("initial.velocity", None, why)
-
-
-def check_limits(scene: Scene) -> None:
-    """Refuse more steps and modes than the scene's limits allow."""
-    time = scene.time
-    if time is not None:
-        for key in ("step", "output_step"):
-            if (step := getattr(time, key)) is not None:
-                scene.limits.check("steps", time.end / step, f"time.{key}", step)
-    scene.limits.check("modes", scene.modes.count, "modes.count", scene.modes.count)
 
 
 def check_accuracy(scene: Scene) -> None:

@@ -12,41 +12,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from functools import partial
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo
 
 from rotfem import registry
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
-from rotfem.scene.span_tables import (
-    OF_FILE,
-    AnyProfile,
-    FromFile,
-    MatrixTable,
-    NonNegativeProfile,
-    Point,
-    PointTable,
-    PositiveProfile,
-    as_matrix_or_table,
-    as_point_or_table,
-    file_columns,
-)
-from rotfem.scene.table import SceneModel, Unit, Way, along, as_name, choose_way, problem, problems_at
+from rotfem.scene.span_tables import Center, Matrices, file_columns, symmetric
+from rotfem.scene.table import SceneModel, Way, along, as_name, choose_way, problem, problems_at
 from rotfem.scene.values import (
     ROUND_OFF,
     Array,
-    Bounds,
-    Matrix,
+    NonNegative,
+    Number,
+    Positive,
     Profile,
+    ShearCorrection,
     evaluate,
     is_table,
 )
 
-PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile), OF_FILE]
-ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile), OF_FILE]
+PoissonProfile = Profile[Annotated[float, Field(strict=True, gt=-1, le=0.5)]]
 
 
 class Section(SceneModel):
@@ -65,14 +53,14 @@ class Section(SceneModel):
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ()
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Annotated[PositiveProfile, along("m")] | None]
+    __pydantic_extra__: dict[str, Annotated[Profile[Positive], along("m")] | None]
 
-    E: Annotated[PositiveProfile, along("Pa")] | None = None
+    E: Annotated[Profile[Positive], along("Pa")] | None = None
     nu: PoissonProfile | None = None
-    rho: Annotated[PositiveProfile, along("kg/m**3")] | None = None
-    area: Annotated[PositiveProfile, along("m**2")] | None = None
+    rho: Annotated[Profile[Positive], along("kg/m**3")] | None = None
+    area: Annotated[Profile[Positive], along("m**2")] | None = None
     shape: str | None = None
-    shear_correction: ShearProfile | None = None
+    shear_correction: Profile[ShearCorrection] | None = None
 
     @classmethod
     def keys(cls) -> list[str]:
@@ -102,9 +90,9 @@ class Section(SceneModel):
         return all(len({value for _, value in taper}) == 1 for taper in self.tapers.values())
 
     @property
-    def tapers(self) -> dict[str, tuple[tuple[float, Any], ...]]:
+    def tapers(self) -> dict[str, Any]:
         """The properties given as tables over the span, by name: rows (x, value), values may be points or matrices."""
-        return {name: value for name, value in self.given.items() if isinstance(value, tuple) and is_table(value)}
+        return {name: value for name, value in self.given.items() if is_table(value)}
 
     @property
     def knots(self) -> list[float]:
@@ -190,12 +178,12 @@ class PlanarSection(Section):
     )
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction",)
 
-    EA: Annotated[PositiveProfile, along("N")] | None = None
-    GA: Annotated[PositiveProfile, along("N")] | None = None
-    EI: Annotated[PositiveProfile, along("N*m**2")] | None = None
-    mass_per_length: Annotated[PositiveProfile, along("kg/m")] | None = None
-    rotary_inertia: Annotated[NonNegativeProfile, along("kg*m")] | None = None
-    second_moment: Annotated[PositiveProfile, along("m**4")] | None = None
+    EA: Annotated[Profile[Positive], along("N")] | None = None
+    GA: Annotated[Profile[Positive], along("N")] | None = None
+    EI: Annotated[Profile[Positive], along("N*m**2")] | None = None
+    mass_per_length: Annotated[Profile[Positive], along("kg/m")] | None = None
+    rotary_inertia: Annotated[Profile[NonNegative], along("kg*m")] | None = None
+    second_moment: Annotated[Profile[Positive], along("m**4")] | None = None
 
     def _check(self) -> None:
         super()._check()
@@ -225,27 +213,18 @@ class PlanarSection(Section):
 # --- spatial beams ----------------------------------------------------------------------------------------------------
 
 
-def _as_mass(value: Any) -> Matrix | MatrixTable:
-    """Return a mass matrix or a table of them; raise on any that no rigid mass has."""
-    read = as_matrix_or_table(value, definite=False)
-    for x, M in [(row[0], row[1]) for row in read] if is_table(read) else [(None, read)]:
+def _check_mass(value: Any) -> Any:
+    """Return a mass matrix or a table of them; refuse any that no rigid mass has."""
+    for x, M in value if is_table(value) else [(None, value)]:
         rows = np.array(M)
         m, coupling, size = rows[0, 0], rows[:3, 3:], ROUND_OFF * np.max(np.abs(rows))
         rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=ROUND_OFF * abs(m))
         if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
             where = "" if x is None else f"at x = {x:g} it "
             rigid_mass = "m 1 with m > 0 for velocities, m times a skew matrix off the diagonal"
-            reason = f"{where}must be that of rigid mass: {rigid_mass}"
-            raise problem("", rows.tolist(), reason)
-    return read
+            raise problem("", rows.tolist(), f"{where}must be that of rigid mass: {rigid_mass}")
+    return value
 
-
-Center: TypeAlias = Annotated[
-    Point | PointTable, PlainValidator(as_point_or_table), FromFile((3,), "a table [[x, y, z], …]"), Unit("m")
-]
-MATRICES_OF_FILE = FromFile(
-    (37, 22), "x and 36 entries row by row, or x and 21 entries of the upper triangle row by row"
-)
 
 #: What says where in a section its properties belong to, and the radius of its fibers.
 _PLACES = ("mass_center", "shear_center", "tension_center", "principal_angle", "polar_radius")
@@ -293,28 +272,25 @@ class SpatialSection(Section):
     )
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_PLACES)
 
-    EA: Annotated[PositiveProfile, along("N")] | None = None
-    GA2: Annotated[PositiveProfile, along("N")] | None = None
-    GA3: Annotated[PositiveProfile, along("N")] | None = None
-    GJ: Annotated[PositiveProfile, along("N*m**2")] | None = None
-    EI2: Annotated[PositiveProfile, along("N*m**2")] | None = None
-    EI3: Annotated[PositiveProfile, along("N*m**2")] | None = None
-    mass_per_length: Annotated[PositiveProfile, along("kg/m")] | None = None
-    rotary_inertia2: Annotated[NonNegativeProfile, along("kg*m")] | None = None
-    rotary_inertia3: Annotated[NonNegativeProfile, along("kg*m")] | None = None
-    second_moment2: Annotated[PositiveProfile, along("m**4")] | None = None
-    second_moment3: Annotated[PositiveProfile, along("m**4")] | None = None
-    torsion_constant: Annotated[PositiveProfile, along("m**4")] | None = None
+    EA: Annotated[Profile[Positive], along("N")] | None = None
+    GA2: Annotated[Profile[Positive], along("N")] | None = None
+    GA3: Annotated[Profile[Positive], along("N")] | None = None
+    GJ: Annotated[Profile[Positive], along("N*m**2")] | None = None
+    EI2: Annotated[Profile[Positive], along("N*m**2")] | None = None
+    EI3: Annotated[Profile[Positive], along("N*m**2")] | None = None
+    mass_per_length: Annotated[Profile[Positive], along("kg/m")] | None = None
+    rotary_inertia2: Annotated[Profile[NonNegative], along("kg*m")] | None = None
+    rotary_inertia3: Annotated[Profile[NonNegative], along("kg*m")] | None = None
+    second_moment2: Annotated[Profile[Positive], along("m**4")] | None = None
+    second_moment3: Annotated[Profile[Positive], along("m**4")] | None = None
+    torsion_constant: Annotated[Profile[Positive], along("m**4")] | None = None
     mass_center: Center | None = None
     shear_center: Center | None = None
     tension_center: Center | None = None
-    polar_radius: Annotated[NonNegativeProfile, along("m")] | None = None
-    principal_angle: Annotated[AnyProfile, along("rad")] | None = None
-    stiffness: (
-        Annotated[Matrix | MatrixTable, PlainValidator(partial(as_matrix_or_table, definite=True)), MATRICES_OF_FILE]
-        | None
-    ) = None
-    mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass), MATRICES_OF_FILE] | None = None
+    polar_radius: Annotated[Profile[NonNegative], along("m")] | None = None
+    principal_angle: Annotated[Profile[Number], along("rad")] | None = None
+    stiffness: Annotated[Matrices, symmetric(6, definite=True)] | None = None
+    mass: Annotated[Matrices, symmetric(6, definite=False), AfterValidator(_check_mass)] | None = None
 
     @property
     def has_rotary_inertia(self) -> bool:

@@ -4,30 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, StrictBool, Tag, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import show
-from rotfem.scene.files import as_table
-from rotfem.scene.table import (
-    SceneModel,
-    Unit,
-    as_name,
-    as_names,
-    problem,
-)
+from rotfem.scene.files import FROM_FILE
+from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, as_names, problem, unit
 from rotfem.scene.values import (
-    Bounds,
     Count,
-    Matrix,
+    NonNegative,
     Number,
     Positive,
     WithParameters,
-    as_list,
-    as_number,
     check_increasing,
     on_span,
     parameters_of,
@@ -39,20 +30,16 @@ def _as_effects(value: Any) -> str | tuple[str, ...]:
     return "auto" if value == "auto" else as_names(value, registry.effects.names, "an effect", '"auto" or ')
 
 
-def _as_plate_elements(value: Any) -> tuple[int, int]:
-    pair = value if isinstance(value, list | tuple) else [value, value]
-    nx, ny = as_list(pair, Bounds(ge=1, le=1e6).integer, "an integer at least 1, or two of them [nx, ny]", [2])
-    return nx, ny
-
-
-Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
+Degree = Annotated[int, Field(strict=True, ge=1, le=6)]
+#: (nx, ny); a number stands for both.
+Elements = Annotated[
+    tuple[Count, Count], BeforeValidator(lambda given: given if isinstance(given, list | tuple) else (given, given))
+]
 Integration = Literal["reduced", "full"]
 
 
 _LADDER = 'it went with version 0.9; "accuracy" chooses theory, mesh and steps, "rotfem explain" compares theories'
 _REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
-#: Keys of [model] in earlier versions ↦ what takes their place.
-GONE = {"tolerance": _LADDER, "on_exceed": _LADDER, "reduced": _REDUCED, "foreshortening": _REDUCED}
 
 
 class Model(SceneModel):
@@ -67,23 +54,36 @@ class Model(SceneModel):
         all_unknowns: whether a history keeps unknowns that are zero by symmetry.
     """
 
+    GONE: ClassVar[Mapping[str, str]] = {
+        "tolerance": _LADDER,
+        "on_exceed": _LADDER,
+        "reduced": _REDUCED,
+        "foreshortening": _REDUCED,
+    }
+
     theory: Annotated[str, PlainValidator(lambda value: as_name(value, registry.theories))] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     prestress: Literal["axial", "all"] | None = None
-    all_unknowns: bool = False
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        for key, instead in GONE.items():
-            if key in data:
-                raise problem(key, None, f"unknown key; {instead}")
-        return data
+    all_unknowns: StrictBool = False
 
 
-def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:
-    rows = as_table(value, info, (3, 4), "a table [[x, v1, v2, v3], …] (v3 may be left out)", check_increasing)
-    return tuple((*row, 0.0)[:4] for row in rows)
+def _padded(rows: Any) -> Any:
+    """Return rows (x, v1, v2, v3) of rows that may leave v3 out."""
+    return [(*row, 0.0)[:4] if len(row) in (3, 4) else row for row in rows] if _is_rows(rows) else rows
+
+
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, list | tuple) and all(isinstance(row, list | tuple) for row in value)
+
+
+Velocities = Annotated[
+    tuple[tuple[Number, Number, Number, Number], ...],
+    BeforeValidator(_padded),
+    FROM_FILE,
+    AfterValidator(check_increasing),
+    unit("m", "m/s"),
+]
 
 
 class Initial(SceneModel):
@@ -99,12 +99,12 @@ class Initial(SceneModel):
         velocity: rows (x, v1, v2, v3) of a beam's axis relative to the turning frame (m, m/s), or None.
     """
 
-    tip_displacement: Annotated[Number, Unit("m")] | None = None
+    tip_displacement: Annotated[Number, unit("m")] | None = None
     state: Literal["steady", "undeformed"] = "steady"
     mode: Count | None = None
-    amplitude: Annotated[Number, Unit("m")] | None = None
-    phase: Annotated[Number, Unit("rad")] = 0.0
-    velocity: Annotated[Matrix, PlainValidator(_as_velocities), Unit(("m", "m/s"))] | None = None
+    amplitude: Annotated[Number, unit("m")] | None = None
+    phase: Annotated[Number, unit("rad")] = 0.0
+    velocity: Velocities | None = None
 
     @property
     def moves(self) -> bool:
@@ -116,6 +116,11 @@ class Initial(SceneModel):
         """The key that says how a motion starts; None where it starts at rest in a state of balance."""
         return next((key for key in ("tip_displacement", "mode", "velocity") if getattr(self, key) is not None), None)
 
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Add that a static shape is no state of balance at speed."""
+        return {"state": "undeformed", **data} if data.get("tip_displacement") is not None else data
+
     def _check(self) -> None:
         if (self.mode is None) != (self.amplitude is None):
             raise problem("amplitude", self.amplitude, "mode and amplitude are given together")
@@ -125,10 +130,8 @@ class Initial(SceneModel):
             raise problem("tip_displacement", self.tip_displacement, "cannot be combined with mode or velocity")
         if self.mode is not None and self.velocity is not None:
             raise problem("velocity", None, "cannot be combined with mode, which has velocities")
-        if self.tip_displacement is not None:
-            if self.state == "steady" and "state" in self.model_fields_set:
-                raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
-            vars(self)["state"] = "undeformed"
+        if self.tip_displacement is not None and self.state == "steady":
+            raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
 
 
 class BeamMesh(SceneModel):
@@ -160,7 +163,7 @@ class PlateMesh(SceneModel):
         integration: quadrature of the membrane and shear terms; "reduced" avoids locking.
     """
 
-    elements: Annotated[tuple[int, int], PlainValidator(_as_plate_elements)] = (8, 8)
+    elements: Elements = (8, 8)
     degree: Degree = 2
     cell: Literal["quadrilateral", "triangle"] = "quadrilateral"
     integration: Integration = "reduced"
@@ -169,9 +172,9 @@ class PlateMesh(SceneModel):
         """Return the mesh with the counts that suit a rectangle, where none are given."""
         if "elements" in self.model_fields_set or structure.mesh_file is not None:
             return self
-        out = self.model_copy()
-        # Not by `update`, which would count them as given: for another structure they are chosen anew.
-        vars(out)["elements"] = _counts_for(structure.length / structure.width)
+        counts = _counts_for(structure.length / structure.width)
+        # Not by `model_copy`, which would count them as given: for another structure they are chosen anew.
+        out: Self = self.model_construct(self.model_fields_set, **{**self.model_dump(), "elements": counts})  # type: ignore[arg-type,assignment]
         return out
 
     @classmethod
@@ -222,11 +225,7 @@ def usual(given: Mapping[str, Any]) -> str:
     return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
 
 
-def _as_times(value: Any) -> tuple[float, ...]:
-    return tuple(sorted(as_list(value, Bounds(ge=0.0).number, "a list of times (s) of at least 0")))
-
-
-Seconds = Annotated[Positive, Unit("s")]
+Seconds = Annotated[Positive, unit("s")]
 
 
 class Time(WithParameters):
@@ -247,13 +246,13 @@ class Time(WithParameters):
 
     CHOICE, ENTRIES = "scheme", registry.schemes
 
-    end: Seconds = Field(description="a number greater than 0 (s)")
+    end: Seconds
     step: Seconds | None = None
     tolerance: Positive | None = None
     max_step: Seconds | None = None
     min_step: Seconds | None = None
     scheme: str = "generalised_alpha"
-    breakpoints: Annotated[tuple[float, ...], PlainValidator(_as_times), Unit("s")] = ()
+    breakpoints: Annotated[tuple[NonNegative, ...], AfterValidator(lambda times: tuple(sorted(times))), unit("s")] = ()
     output_every: Count = 1
     output_step: Seconds | None = None
 
@@ -289,16 +288,10 @@ class Time(WithParameters):
             raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
 
 
-def _as_orders(value: Any) -> tuple[int, ...]:
-    shape = "a list of at most 100 multiples of the speed, such as [1, 3, 6, 9]"
-    return tuple(sorted(set(as_list(value, Bounds(ge=1).integer, shape, range(101)))))
-
-
-def _as_speed_range(value: Any) -> tuple[float, float]:
-    low, high = as_list(value, Bounds(ge=0.0).number, "two speeds, [lowest, highest] (rad/s)", [2])
-    if not low < high:
-        raise problem("", value, "must be two speeds that increase")
-    return low, high
+def _increasing_pair(speeds: tuple[float, float]) -> tuple[float, float]:
+    if not speeds[0] < speeds[1]:
+        raise problem("", None, "must be two speeds that increase")
+    return speeds
 
 
 class Modes(SceneModel):
@@ -315,9 +308,9 @@ class Modes(SceneModel):
 
     count: Count = 6
     about: Literal["steady", "undeformed"] = "steady"
-    orders: Annotated[tuple[int, ...] | None, PlainValidator(_as_orders)] = None
-    rated: Annotated[Positive, Unit("rad/s")] | None = None
-    operating: Annotated[tuple[float, float] | None, PlainValidator(_as_speed_range), Unit("rad/s")] = None
+    orders: Annotated[tuple[Count, ...], AfterValidator(lambda orders: tuple(sorted(set(orders))))] | None = None
+    rated: Annotated[Positive, unit("rad/s")] | None = None
+    operating: Annotated[tuple[NonNegative, NonNegative], AfterValidator(_increasing_pair), unit("rad/s")] | None = None
 
 
 class Solver(SceneModel):
@@ -346,14 +339,19 @@ def _as_quantities(value: Any) -> tuple[str, ...]:
     return as_names(value, (*registry.outputs.names, *sections), "an output")
 
 
-def _as_stations(value: Any) -> int | tuple[float, ...]:
-    if type(value) is int and 2 <= value <= 10_000:
-        return value
-    why = "a list of positions along the beam (m), or how many there are, 2 to 10000"
-    places: tuple[float, ...] = as_list(value, as_number, why, range(1, 10_001))
-    if any(b <= a for a, b in pairwise(places)):
-        raise problem("", value, "must be positions that increase")
+def _increasing(places: tuple[float, ...]) -> tuple[float, ...]:
+    if not places or any(b <= a for a, b in pairwise(places)):
+        raise problem("", None, "must be positions that increase")
     return places
+
+
+#: Positions that increase, or how many there are.
+Stations = Annotated[
+    Annotated[int, Field(strict=True, ge=2, le=10_000), Tag("<one>")]
+    | Annotated[tuple[Number, ...], AfterValidator(_increasing), Tag("<rows>")],
+    BY_SHAPE,
+    unit("m"),
+]
 
 
 def _as_fields(value: Any) -> tuple[str, ...]:
@@ -381,11 +379,11 @@ class OutputTable(SceneModel):
     """
 
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_quantities)] = ()
-    stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations), Unit("m")] = None
+    stations: Stations | None = None
     every: Count = 1
     format: Literal["csv", "hdf5"] = "csv"
     fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
-    error: bool = True
+    error: StrictBool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"
 

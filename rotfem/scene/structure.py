@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from inspect import Parameter, signature
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import ConfigDict, PlainValidator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag
 
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
-from rotfem.scene.table import SceneModel, Unit, did_you_mean, problem, problems_at
-from rotfem.scene.values import Bounds, NonNegative, as_list, as_vector, such
+from rotfem.scene.table import SceneModel, did_you_mean, problem, unit
+from rotfem.scene.values import NonNegative
 
 
 @dataclass(frozen=True)
@@ -75,27 +75,22 @@ for _name, _home in (
 
 # --- damping ----------------------------------------------------------------------------------------------------------
 
+Ratio = Annotated[float, Field(strict=True, ge=0, lt=1)]
+#: Ratios in the order of frequency; a number is one.
+Ratios = Annotated[
+    tuple[Ratio, ...], BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value])
+]
+
+
+def _kind_of_ratios(value: Any) -> str:
+    return "<table>" if isinstance(value, Mapping) else "<rows>" if isinstance(value, list | tuple) else "<one>"
+
+
 #: One ratio for the first modes, one for each in the order of frequency, or family ↦ such ratios.
-Ratios: TypeAlias = float | tuple[float, ...] | dict[str, tuple[float, ...]]
-
-_RATIO = Bounds(ge=0.0, lt=1.0)
-
-
-Rayleigh = such(lambda value: as_vector(value, (2,)), lambda a: min(a) >= 0.0, "must be [a0, a1], both at least 0")
-
-
-def _as_modal(value: Any) -> Ratios:
-    if isinstance(value, Mapping):
-        return {str(family): _as_ratios(given, str(family)) for family, given in value.items()}
-    return _as_ratios(value, "") if isinstance(value, list | tuple) else _RATIO.number(value)
-
-
-def _as_ratios(value: Any, key: str) -> tuple[float, ...]:
-    """Return ratios in the order of frequency; a number is one."""
-    with problems_at(key, value):
-        if not isinstance(value, list | tuple):
-            return (_RATIO.number(value),)
-        return as_list(value, _RATIO.number, "a list of damping ratios (0.005 is half a per cent)")
+Modal = Annotated[
+    Annotated[Ratio, Tag("<one>")] | Annotated[Ratios, Tag("<rows>")] | Annotated[dict[str, Ratios], Tag("<table>")],
+    Discriminator(_kind_of_ratios),
+]
 
 
 class Damping(SceneModel):
@@ -113,9 +108,9 @@ class Damping(SceneModel):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, NonNegative]
 
-    kelvin_voigt: Annotated[NonNegative, Unit("s")] = 0.0
-    rayleigh: Annotated[tuple[float, float], Rayleigh, Unit(("1/s", "s"))] = (0.0, 0.0)
-    modal: Annotated[Ratios, PlainValidator(_as_modal), Unit("dimensionless")] = 0.0
+    kelvin_voigt: Annotated[NonNegative, unit("s")] = 0.0
+    rayleigh: Annotated[tuple[NonNegative, NonNegative], unit("1/s", "s")] = (0.0, 0.0)
+    modal: Annotated[Modal, unit("dimensionless")] = 0.0
 
     @classmethod
     def keys(cls) -> list[str]:

@@ -1,4 +1,4 @@
-"""A table of the scene: its keys, alternatives among them, and from the errors of validation to one readable error."""
+"""A table of the scene: its keys, alternatives among them, units, and one translator of pydantic's errors into ours."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from inspect import Parameter, Signature
-from typing import TYPE_CHECKING, Any, Self, get_args, get_type_hints
+from functools import partial
+from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, ValidationInfo, model_validator
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from rotfem.errors import Problem, SceneError, show
 from rotfem.registry import Registry
 from rotfem.short import short
 from rotfem.units import is_quantity, quantity
-
-if TYPE_CHECKING:
-    from pydantic._internal._model_construction import ModelMetaclass
-else:
-    ModelMetaclass = type(BaseModel)  # which has no public name
-
-# Names that validation puts into the path of an error to say which kind of table it tried.
-_TAGS = {
-    "structure": {"planar_beam", "spatial_beam", "plate"},
-    "motion": {"constant", "spin_up", "table", "torque", "callable", "law"},
-    "mesh": {"beam", "plate"},
-}
 
 
 def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
@@ -51,6 +49,8 @@ def problems_at(key: str, value: Any, before: str = "") -> Iterator[None]:
         if (error.context or {}).get("key"):
             raise
         raise problem(key, value, f"{before}{error.message()}") from None
+    except ValidationError as error:
+        raise problem(key, value, f"{before}{scene_error('', error).allowed}") from None
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
@@ -83,53 +83,29 @@ def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> t
 # --- units ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Unit:
-    """The unit of a key, as an annotation of its type: texts such as "12.1 rpm" become numbers before it is validated.
+def in_units(value: Any, units: Sequence[str], over: Sequence[str] = ()) -> Any:
+    """Return a value with numbers in the place of texts with units, such as "12.1 rpm".
 
-    Attributes:
-        unit: of all numbers, or one for each component of a vector or column of rows, the last one of all further ones.
-            "" stands for that of SI.
+    A text that is no number with a unit stays, for who wants a number, or the path of a file.
+
+    Args:
+        value: number, vector, rows, or a table of them by name.
+        units: of the components of a vector or the columns of rows, the last one of all further ones. "" stands for
+            that of SI.
         over: units of the columns of rows that are before these.
+
+    Raises:
+        PydanticCustomError: the unit of one is not of the kind that is wanted.
     """
-
-    unit: str | tuple[str, ...]
-    over: tuple[str, ...] = ()
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
-
-    def read(self, value: Any) -> Any:
-        """Return a value with numbers in the place of texts with units; raise if one of these is not of the kind."""
-        if isinstance(value, Mapping):
-            return {key: self.read(entry) for key, entry in value.items()}
-        if not _has_text(value) or (isinstance(value, str) and not is_quantity(value)):
-            return value  # a text that is no number with a unit stays, for who wants a number
-        units = (self.unit,) if isinstance(self.unit, str) else self.unit
-        return _in_units(value, units, self.over)
-
-
-def along(unit: str) -> Unit:
-    """Return the unit of what varies over the span: tables have x (m) in their first column."""
-    return Unit(unit, ("m",))
-
-
-def has_unit(kind: Any) -> bool:
-    """Return whether a type says a unit."""
-    return isinstance(kind, Unit) or any(map(has_unit, get_args(kind)))
-
-
-def _has_text(value: Any) -> bool:
-    return any(map(_has_text, value)) if isinstance(value, list | tuple) else isinstance(value, str)
-
-
-def _in_units(value: Any, units: tuple[str, ...], over: tuple[str, ...]) -> Any:
-    """Return a number, a vector or rows."""
+    if isinstance(value, Mapping):
+        return {key: in_units(entry, units, over) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         if any(isinstance(entry, list | tuple) for entry in value):
-            return [_in_units(row, (*over, *units), ()) for row in value]
-        return [_in_units(entry, units[min(i, len(units) - 1) :], ()) for i, entry in enumerate(value)]
-    if not isinstance(value, str):
+            return [in_units(row, (*over, *units)) for row in value]
+        if not any(isinstance(entry, str) for entry in value):
+            return value
+        return [in_units(entry, units[min(i, len(units) - 1) :]) for i, entry in enumerate(value)]
+    if not isinstance(value, str) or not is_quantity(value):
         return value
     try:
         return quantity(value, units[0])
@@ -137,42 +113,41 @@ def _in_units(value: Any, units: tuple[str, ...], over: tuple[str, ...]) -> Any:
         raise problem("", value, str(error)) from None
 
 
+def unit(*units: str, over: tuple[str, ...] = ()) -> BeforeValidator:
+    """Return what reads texts with units before a key is validated, as an annotation of its type (see `in_units`)."""
+    return BeforeValidator(partial(in_units, units=units, over=over))
+
+
+def along(name: str) -> BeforeValidator:
+    """Return the unit of what varies over the span: tables have x (m) in their first column."""
+    return unit(name, over=("m",))
+
+
 # --- tables -----------------------------------------------------------------------------------------------------------
 
+_TABLE = "must be a table of key = value pairs"
 
-class InputErrors(ModelMetaclass):
-    """The metaclass of tables: what a script makes of wrong values is an `InputError`, as in a scene."""
 
-    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        """Return the table; values may be texts with units, as in a scene.
+class SceneModel(BaseModel):
+    """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    #: Keys of earlier versions ↦ what takes their place.
+    GONE: ClassVar[Mapping[str, str]] = {}
+
+    def __init__(self, **data: Any) -> None:
+        """Make a table in a script; values may be texts with units, as in a scene.
 
         Raises:
             SceneError: it is not valid; the name of the class stands for that of the file.
         """
         try:
-            return super().__call__(*args, **kwargs)
+            super().__init__(**data)
         except ValidationError as error:
-            raise scene_error(cls.__name__, error) from None
+            raise scene_error(type(self).__name__, error) from None
 
-    @property
-    def __signature__(cls) -> Signature:
-        """Signature of the class: the keys of the table, with the types that a script may give."""
-        parameters, kinds, whole = [], get_type_hints(cls), get_type_hints(cls, include_extras=True)
-        for name, field in cls.model_fields.items():
-            kind = kinds[name] | str if has_unit(whole[name]) else kinds[name]
-            default = Parameter.empty if field.is_required() else field.get_default(call_default_factory=True)
-            parameters.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
-        return Signature(parameters)
-
-    @__signature__.setter
-    def __signature__(cls, _: Any) -> None:
-        """Keep it from pydantic, whose own has validators in the place of types."""
-
-
-class SceneModel(BaseModel, metaclass=InputErrors):
-    """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
-
-    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # tables in tables are validated with theirs
 
     def __repr__(self) -> str:
         given = {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
@@ -206,21 +181,48 @@ class SceneModel(BaseModel, metaclass=InputErrors):
             return data
         data = cls._table(data)
         if not isinstance(data, Mapping):
-            raise problem("", data, "must be a table of key = value pairs")
+            raise problem("", data, _TABLE)
         data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
-                hint = did_you_mean(key, names)
-                raise problem(str(key), None, f"unknown key; {hint}allowed: {', '.join(names)}")
-        for name, field in cls.model_fields.items():
-            if field.is_required() and name not in data:
-                raise problem(name, None, f"required key is missing; must be {field.description or 'given'}")
+                instead = cls.GONE.get(key) or f"{did_you_mean(key, names)}allowed: {', '.join(names)}"
+                raise problem(str(key), None, f"unknown key; {instead}")
         return data
 
     @model_validator(mode="after")
     def _check_keys(self) -> Self:
         self._check()
         return self
+
+
+def empty() -> Any:
+    """Return the default of a table whose keys all have defaults."""
+    return Field(default_factory=dict, validate_default=True)
+
+
+def one_of(tables: Mapping[str, type[SceneModel]], other: type[SceneModel] | None = None) -> PlainValidator:
+    """Return what reads a table of the type that its key `type` names; of any other type it is `other`, if given.
+
+    Not a union of pydantic's: the classes that a scene does not name need no validators, which take time to make.
+    """
+
+    def read(value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, SceneModel):
+            return value
+        if not isinstance(value, Mapping):
+            raise problem("", value, _TABLE)
+        kind = value.get("type")
+        table = tables.get(kind, other) if isinstance(kind, str) else other
+        if table is None:
+            missing = "required key is missing; " if kind is None else did_you_mean(kind, tables)
+            raise problem("type", kind, f"{missing}allowed: {', '.join(map(show, tables))}")
+        return table.model_validate(value, context=info.context)
+
+    return PlainValidator(read)
+
+
+#: Annotations of types that lists and other values have: those tagged "<rows>" and "<one>".
+BY_SHAPE = Discriminator(lambda value: "<rows>" if isinstance(value, list | tuple) else "<one>")
 
 
 @dataclass(frozen=True)
@@ -266,6 +268,26 @@ def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
 
 # --- errors -----------------------------------------------------------------------------------------------------------
 
+#: Types of pydantic's errors ↦ what is allowed, with what they know of it.
+_ALLOWED = {
+    "missing": "required key is missing",
+    "float_type": "must be a number",
+    "int_type": "must be an integer",
+    "finite_number": "must be a finite number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "bool_type": "must be true or false",
+    "string_type": "must be a text",
+    "tuple_type": "must be a list",
+    "too_short": "must have at least {min_length} entries",
+    "too_long": "must have at most {max_length} entries",
+    "model_type": _TABLE,
+    "model_attributes_type": _TABLE,
+    "dict_type": _TABLE,
+}
+
 
 def scene_error(file: str, error: ValidationError) -> SceneError:
     """Return the problems found by validation as one error."""
@@ -273,37 +295,22 @@ def scene_error(file: str, error: ValidationError) -> SceneError:
     return SceneError(file, *first, others)
 
 
-#: Types of pydantic's errors ↦ what is allowed.
-_ALLOWED = {
-    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "must be a table of key = value pairs"),
-    "tuple_type": "must be a list of tables",
-    "bool_type": "must be true or false",
-}
-
-
 def _problem(details: dict[str, Any]) -> Problem:
-    path = list(details["loc"])
-    if len(path) > 1 and path[1] in _TAGS.get(str(path[0]), ()):
-        del path[1]
-    context: dict[str, Any] = details.get("ctx", {})
-    value, kind = details["input"], details["type"]
+    """Return a problem in our words: path of the key without the tags of types, value, what is allowed."""
+    path = [part for part in map(str, details["loc"]) if not part.startswith("<")]
+    context, value, kind = details.get("ctx", {}), details["input"], details["type"]
     if kind == "scene":
         if context["key"]:
             path.append(context["key"])
-        value = context["value"] if context["key"] or context["value"] is None else value
+        value = context["value"] if context["key"] or context["value"] is not None else value
         reason = context["reason"]
-    elif kind in ("literal_error", "union_tag_invalid"):
-        names = re.findall(r"'([^']*)'", context.get("expected") or context.get("expected_tags", ""))
-        if kind == "union_tag_invalid":
-            path.append("type")
-            value = value.get("type") if isinstance(value, Mapping) else value
-        reason = f"{did_you_mean(value, names)}allowed: {', '.join(show(name) for name in names)}"
-    elif kind == "union_tag_not_found":
-        path.append("type")
-        value, reason = None, f"required key is missing; allowed: {', '.join(map(show, sorted(_TAGS[str(path[0])])))}"
+    elif kind == "missing" and isinstance(details["loc"][-1], int):
+        path, reason = path[:-1], f"must have more entries than {len(value)}"
+    elif kind == "literal_error":
+        names = re.findall(r"'([^']*)'", context["expected"])
+        reason = f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}"
     else:
-        message = str(details["msg"])
-        reason = _ALLOWED.get(kind, message[0].lower() + message[1:])
+        reason = _ALLOWED[kind].format(**context) if kind in _ALLOWED else str(details["msg"])
     if isinstance(value, Mapping):
         value = None  # a whole table says nothing that its key does not
-    return Problem(".".join(str(part) for part in path), value, reason)
+    return Problem(".".join(path), value, reason)

@@ -1,4 +1,4 @@
-"""`--report`: one file, opened in a Chromium without a screen: tables sort, figures answer, modes move, it prints."""
+"""`--report`: one file, opened in a Chromium without a screen: tables sort, figures answer, modes move."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ const pause = time => new Promise(done => setTimeout(done, time));
 const column = (table, i) => [...table.tBodies[0].rows].map(row => +row.cells[i].dataset.value);
 const pixels = canvas => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.join("");
 async function act() {
-  const said = {tables: [], ranges: []};
+  const said = {tables: [], figures: window.Bokeh ? [...Bokeh.index.query(v => v.model.type === "Figure")].length : 0};
   for (const table of document.querySelectorAll("table.sortable")) {
     const i = [...table.tBodies[0].rows[0].cells].findIndex(cell => cell.dataset.value !== undefined);
     const head = table.tHead.rows[0].cells[i];
@@ -43,20 +43,6 @@ async function act() {
     const up = column(table, i);
     head.click();
     said.tables.push([up, column(table, i), head.ariaSort]);
-  }
-  const all = window.Bokeh ? [...Bokeh.index.query(view => view.model.type === "Figure")] : [];
-  for (const root of new Set(all.map(view => view.root))) {
-    const plots = all.filter(view => view.root === root);
-    const event_of = (view, name, x) => new PointerEvent(name, {
-      clientX: view.el.getBoundingClientRect().left + x, clientY: view.el.getBoundingClientRect().top + 60,
-      buttons: 1, pointerId: 1, pointerType: "mouse", isPrimary: true, bubbles: true, composed: true});
-    const view = plots[0], before = plots.map(p => p.model.x_range.start), target = view.canvas_view.events_el;
-    target.setPointerCapture = () => {};
-    for (const [name, x] of [["pointerdown", 300], ["pointermove", 260], ["pointermove", 220], ["pointerup", 220]]) {
-      target.dispatchEvent(event_of(view, name, x));
-      await pause(50);
-    }
-    said.ranges.push([before, plots.map(p => p.model.x_range.start)]);
   }
   const canvas = document.querySelector(".modes canvas");
   if (canvas) {
@@ -78,26 +64,18 @@ addEventListener("load", () => setTimeout(finish, 1500));
 </script>"""
 
 
-def browse(folder: Path, page: Path, *options: str) -> str:
-    """Return what Chromium prints of a page; it has no network."""
-    given = (
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-background-networking",
-        "--disable-dev-shm-usage",
-    )
-    alone = (f"--user-data-dir={folder / 'browser'}", "--proxy-server=127.0.0.1:9", "--virtual-time-budget=8000")
-    command = [str(BROWSER), *given, *alone, *options, page.as_uri()]
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
-
-
 def opened(folder: Path, page: Path) -> dict[str, Any]:
-    """Return what comes of a person's acts on a page."""
-    text = page.read_text(encoding="utf-8")
+    """Return what comes of a person's acts on a page, in a Chromium without a network."""
+    if BROWSER is None:
+        pytest.skip("there is no Chromium: ./with-fenicsx installs it where Debian's packages are")
     acted = page.with_name("acted.html")
-    acted.write_text(text.replace("<head>", "<head>" + FIRST, 1).replace("</body>", LAST + "</body>"), encoding="utf-8")
-    found = re.search(r'<pre id="said">(.*?)</pre>', browse(folder, acted, "--dump-dom"), re.DOTALL)
+    text = page.read_text(encoding="utf-8").replace("<head>", "<head>" + FIRST, 1).replace("</body>", LAST + "</body>")
+    acted.write_text(text, encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--dump-dom"]
+    options += ["--disable-dev-shm-usage", f"--user-data-dir={folder / 'browser'}", "--proxy-server=127.0.0.1:9"]
+    command = [BROWSER, *options, "--virtual-time-budget=8000", acted.as_uri()]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    found = re.search(r'<pre id="said">(.*?)</pre>', shown, re.DOTALL)
     assert found is not None, "the page did not get to its end"
     said: dict[str, Any] = json.loads(html.unescape(found[1]))
     return said
@@ -107,21 +85,13 @@ def check_page(folder: Path, page: Path) -> dict[str, Any]:
     """Check what all reports have in common; return what comes of a person's acts."""
     text = page.read_text(encoding="utf-8")
     assert len(text.encode()) <= 3_000_000
-    assert (
-        re.findall(r'(?:src|href)\s*=\s*["\']?(?:https?:)?//', re.sub(r"<script.*?</script>", "", text, flags=re.S))
-        == []
-    )
-    if BROWSER is None:
-        pytest.skip("there is no Chromium: ./with-fenicsx installs it where Debian's packages are")
+    outside = r'(?:src|href)\s*=\s*["\']?(?:https?:)?//'
+    assert not re.search(outside, re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL))
     said = opened(folder, page)
     assert said["wrong"] == []
     assert said["tables"]
     for up, down, way in said["tables"]:
-        assert up == sorted(up)
-        assert down == sorted(down, reverse=True)
-        assert way == "descending"
-    for before, after in said["ranges"]:
-        assert all(a > b for a, b in zip(after, before, strict=True)), "the panels do not move together"
+        assert (up, down, way) == (sorted(up), sorted(down, reverse=True), "descending")
     return said
 
 
@@ -136,11 +106,7 @@ def test_report_of_modes(folder: Path, rotfem: Rotfem) -> None:
     assert "a<b>" not in text
     said = check_page(folder, page)
     assert said["moved"]
-    assert len(said["ranges"]) == 1
-    browse(folder, page, f"--print-to-pdf={folder / 'report.pdf'}", "--no-pdf-header-footer")
-    printed = (folder / "report.pdf").read_bytes()
-    assert printed.startswith(b"%PDF")
-    assert len(re.findall(rb"/Type\s*/Page\b", printed)) >= 2
+    assert said["figures"] == 3
 
 
 def test_report_of_a_spin_up(folder: Path, rotfem: Rotfem) -> None:
@@ -148,7 +114,7 @@ def test_report_of_a_spin_up(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("run", str(DEMOS / "spin_up.toml"), *options, "--report", "-o", "out")
     assert done.status == 0, done.err
     said = check_page(folder, folder / "out" / "report.html")
-    assert len(said["ranges"]) >= 1
+    assert said["figures"] == 8
 
 
 def test_report_of_a_run_that_failed(folder: Path, rotfem: Rotfem) -> None:

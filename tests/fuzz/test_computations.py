@@ -26,7 +26,12 @@ def test_numbers_of_any_size(given: tuple[str, Any]) -> None:
 @sized(st.tuples(st.sampled_from(list(VERBS)), mutants("small", most=2)), core=15, nightly=400)
 def test_changes_of_any_kind(given: tuple[str, Any]) -> None:
     verb, tables = given
-    elements = tables.get("mesh", {}).get("elements") if isinstance(tables.get("mesh"), dict) else None
-    if type(elements) is int and elements > 8:  # allowed, but not tried here
-        tables["mesh"]["elements"] = 8
+    for table, key, most in (("mesh", "elements", 8), ("time", "end", 1.0)):  # allowed, but not tried here
+        given_table = tables.get(table)
+        number = given_table.get(key) if isinstance(given_table, dict) else None
+        if isinstance(number, int | float) and number > most:
+            given_table[key] = most
+    step = tables["time"].get("step") if isinstance(tables.get("time"), dict) else None
+    if isinstance(step, int | float) and 0.0 < step < 0.01:
+        tables["time"]["step"] = 0.01
     outcome(lambda: VERBS[verb](tables))

@@ -8,11 +8,9 @@ from typing import Any
 
 import hypothesis.strategies as st
 import tomli_w
-from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
-from rotfem.scene.files import read_rows
 from tests.fuzz.mutants import mutants, numbers, texts, values
 from tests.fuzz.seeds import COMPUTED, SCENES, SEEDS
 from tests.fuzz.trying import VALIDATION, check_message, sized, within
@@ -20,24 +18,9 @@ from tests.fuzz.trying import VALIDATION, check_message, sized, within
 FOLDER = str(next(iter(SCENES)).parent)
 #: Scenes as text, without those that name other files.
 TEXTS = [tomli_w.dumps(tables).encode() for tables in SEEDS["all"]]
-BYTES = [
-    b"\0",
-    b"\xff",
-    b"\xef\xbb\xbf",
-    b"\r\n",
-    b"\n",
-    b"[",
-    b"]",
-    b"=",
-    b'"',
-    b"#",
-    b"e999",
-    b"9" * 5000,
-    b"[[" * 2000,
-    b"\n[" + b"a." * 5000 + b"a]\n",
-    b"\n" + b"a." * 5000 + b"a=1\n",
-]
-BYTES += [b"\xed\xa0\x80", b"nan", b"inf", b"-", b".", b"'''", b"{a=" * 500, b"\x1b[2J", "Ω̈".encode()]
+BYTES = [b"\0", b"\xff", b"\xef\xbb\xbf", b"\r\n", *b"\n [ ] = \" # e999 nan inf - . '''".split(b" ")]
+BYTES += [b"9" * 5000, b"[[" * 2000, b"\n[" + b"a." * 5000 + b"a]\n", b"\n" + b"a." * 5000 + b"a=1\n", b"{a=" * 500]
+BYTES += [b"\xed\xa0\x80", b"\x1b[2J", "Ω̈".encode()]
 
 
 def accepted(make: Any) -> Scene | None:
@@ -79,15 +62,17 @@ def test_files_of_any_kind(text: bytes) -> None:
 
 
 KEYS = [
-    "model.theory",
-    "time.step",
-    "time",
-    "structure.section.EA",
-    "motion.speed",
-    "limits.steps",
-    "mesh",
-    "a.b.c",
     "",
+    *[
+        "model.theory",
+        "time.step",
+        "time",
+        "structure.section.EA",
+        "motion.speed",
+        "structure.supports.0.x",
+        "mesh",
+        "a.b.c",
+    ],
 ]
 overrides = st.one_of(
     texts, st.builds("{}={}".format, st.one_of(st.sampled_from(KEYS), texts), st.one_of(values, texts, numbers))
@@ -101,41 +86,16 @@ def test_overrides_of_any_kind(given: tuple[Path, list[str]]) -> None:
 
 CELLS = [
     "",
-    "0",
-    "1",
-    "2.5",
-    "-1e3",
-    "1e999",
-    "nan",
-    "inf",
-    "O",
-    "1_0",
-    "１",
-    "t",
     "w # s",
-    "0x1p3",
-    "1d5",
     " 3 ",
-    '"1"',
-    "+",
+    *["0", "1", "2.5", "-1e3", "1e999", "nan", "inf", "O", "1_0", "１", "t", "0x1p3", "1d5", '"1"', "+"],
 ]
 cells = st.one_of(st.sampled_from(CELLS), st.floats().map(repr), st.text(max_size=6))
 lines = st.lists(cells, min_size=1, max_size=4).map(",".join)
 
 
-def rows_or_why(text: str) -> dict[int, tuple[float, ...]] | str:
-    """Return the rows of a table, or why it is none."""
-    try:
-        return read_rows(text, Path("speed.csv"))
-    except PydanticCustomError as error:
-        return error.message()
-
-
 @sized(st.lists(lines, max_size=6).map("\n".join), core=150, nightly=2500)
 def test_tables_in_files_of_any_kind(text: str) -> None:
-    """Also: what is read line by line is what is read cell by cell, as where one letter is none of ASCII."""
-    text = text.replace("\r", "\n")
-    assert rows_or_why(text) == rows_or_why(f"{text}\n# é")
     beam = COMPUTED["adaptive"] | {"motion": {"type": "table", "table": "speed.csv"}}
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "speed.csv").write_bytes(text.encode("utf-8", "surrogatepass"))

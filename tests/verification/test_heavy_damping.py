@@ -10,7 +10,6 @@ the roots are those of the exported matrices by LAPACK.
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from typing import Any
 
@@ -20,7 +19,7 @@ import pytest
 import scipy.linalg as sl
 from petsc4py import PETSc
 
-from rotfem import ComputationError, campbell, modes
+from rotfem import campbell, modes
 from rotfem.numerics.ritz import RitzPairs
 from tests.beams import STRUCTURE
 
@@ -84,8 +83,8 @@ def test_proportional_damping(viscosity: float, theory: str) -> None:
 def test_overdamped_modes_are_named() -> None:
     """Each undamped mode is one row that vibrates, or a slow and a fast one with its number."""
     result = modes(beam(0.02, 1.0, 0.0, 9))
-    over = ["lag 4, slow", "lag 4, fast", "lag 5, slow", "lag 5, fast", "lag 6, slow", "lag 6, fast"]
-    assert result.labels == ["lag 1", "lag 2", "lag 3", *over]
+    over = [f"{n}th edgewise, {way}" for n in (4, 5, 6) for way in ("slow", "fast")]
+    assert result.labels == ["1st edgewise", "2nd edgewise", "3rd edgewise", *over]
     np.testing.assert_array_equal(result.frequencies[3:], 0.0)
     np.testing.assert_allclose(result.damping[3:], 1.0)
 
@@ -135,38 +134,10 @@ def test_campbell() -> None:
     """Branches of a heavily damped beam are followed over speed, and none is lost."""
     scene = beam(5e-3, 1.0, 6.0, 4, mesh={"elements": 4})
     result = campbell(scene, [0.0, 3.0, 6.0])
-    assert result.labels == [f"lag {n}" for n in range(1, 5)]
+    assert result.labels == ["1st edgewise", "2nd edgewise", "3rd edgewise", "4th edgewise"]
     assert np.all(np.isfinite(result.frequencies))
     single = modes(scene)
     np.testing.assert_allclose(result.frequencies[-1], single.frequencies, rtol=1e-8)
-
-
-TORQUE = {"type": "torque", "hub_inertia": 200.0, "pulses": [[0.0, 0.3, 50.0]], "speed": 1.0, "hub_damping": 0.1}
-TIME = {"time": {"end": 0.5, "step": 0.1}}
-HEAVY_TIP = {"hub_radius": 0.5, "tip_mass": 0.1, "tip_inertia": 0.01}
-
-
-@pytest.mark.parametrize(
-    ("structure", "rest"),
-    [
-        ({"damping": {"rayleigh": [0.1, 1e56]}}, {"motion": {"type": "constant", "speed": 6.0}}),
-        (
-            {"damping": {"kelvin_voigt": 1e56, "rayleigh": [0.1, 1e-4]}, **HEAVY_TIP},
-            {"motion": TORQUE, **TIME},
-        ),
-        ({"damping": {"kelvin_voigt": 1e100, "rayleigh": [0.1, 1e-4]}, **HEAVY_TIP}, {"motion": TORQUE, **TIME}),
-    ],
-    ids=["vectors", "residuals", "eigenvalues"],
-)
-@pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_damping_beyond_all_proportion(structure: dict[str, Any], rest: dict[str, Any]) -> None:
-    """What underflows is no mode, and what overflows no direction: the program says so, not numpy."""
-    scene = {"structure": STRUCTURE | structure, "mesh": {"elements": 2, "degree": 2}, **rest}
-    try:
-        said = "; ".join(campbell(scene, [0.0, 1.0]).summary["warnings"])
-    except ComputationError as failure:
-        said = failure.what
-    assert re.search("unreliable: round-off|backward error|eigenvalues|singular", said)
 
 
 def test_a_damper_at_a_hinge_on_every_mesh() -> None:
@@ -198,7 +169,7 @@ def test_a_damper_at_a_hinge_without_a_spring(damper: float, damping: dict[str, 
         scene = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
         result = modes({**scene, "model": {"theory": "linear"}, "mesh": {"elements": 3}, "output": {"error": False}})
         found.append([(row["label"], row["growth"], row["frequency"]) for row in result.rows])
-        assert result.rows[0]["label"] == "lag 1, slow"
+        assert result.rows[0]["label"] == "1st edgewise, slow"
         assert result.rows[0]["error_bound"] >= 1.0
     for other in found[1:]:
         assert [label for label, *_ in other] == [label for label, *_ in found[0]]

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rotfem import Problem, RunResult, run
-from rotfem.analysis.theory_error import conditioning
+from rotfem.analysis.conditioning import conditioning
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 

@@ -118,7 +118,7 @@ def test_a_spin_up_over_time(tmp_path: Path) -> None:
     columns = read_csv(tmp_path / "stations.csv")
     assert list(columns) == ["t", "x", "M", "u1", "u2", "alpha"]
     np.testing.assert_array_equal(columns["M"].reshape(11, 5), coarse.stations["M"])
-    path = coarse.stations.write_hdf5(tmp_path / "stations.h5")
+    path = coarse.stations.columns.write_hdf5(tmp_path / "stations.h5")
     with h5py.File(path) as file:
         np.testing.assert_array_equal(file["M"][:], coarse.stations["M"])
         assert file["M"].attrs["units"] == "N·m"
@@ -189,7 +189,7 @@ def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
     resumed = rotfem.run(scene, folder=tmp_path, resume=True)
     assert whole.stations is not None
     assert resumed.stations is not None
-    assert resumed.stations.text() == whole.stations.text()
+    assert resumed.stations.columns.csv() == whole.stations.columns.csv()
 
 
 HUB = {"type": "torque", "hub_inertia": 20.0, "pulses": [[0.0, 0.3, 10.0]]}

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
-from rotfem.scene.files import LARGEST, Unreadable, number_in, read_bytes, shown_cell
+from rotfem.scene.files import Unreadable, number_in, read_bytes, shown_cell
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
-from rotfem.scene.table import Unit, as_name, problem, problems_at
+from rotfem.scene.table import as_name, in_units, problem, problems_at
 from rotfem.scene.values import DIGITS, Array
 
 
@@ -53,7 +53,7 @@ class Deck:
     def __init__(self, path: Path):
         self.path = path
         try:
-            content = read_bytes(path, LARGEST)
+            content = read_bytes(path)
         except Unreadable as error:
             raise problem("section.from", shown(path), f"cannot be read: {error}") from None
         if b"\0" in content:
@@ -191,7 +191,7 @@ class Asked:
     def length(self, deck: Deck, why: str) -> float:
         """Return structure.length (m), which the file does not have; refuse a scene without."""
         with problems_at("length", None):
-            length = Unit("m").read(self.structure.get("length"))
+            length = in_units(self.structure.get("length"), ["m"])
         if not isinstance(length, int | float) or isinstance(length, bool) or not length > 0.0:
             raise problem("length", length, f"must be given, greater than 0 (m), with {deck.path.name}: {why}")
         return float(length)
@@ -312,5 +312,5 @@ def coned_root(radius: float, precone: float) -> dict[str, Any]:
 def line_of(points: npt.ArrayLike) -> tuple[list[Any], ReferenceLine, Array]:
     """Return the rows of a line through points (m) from its first one, the line itself and its arc lengths there."""
     rows = (np.asarray(points) - np.asarray(points)[0]).tolist()
-    through = line_through(as_line(rows))
+    through = line_through(as_line(tuple(map(tuple, rows))))
     return rows, through, np.array([0.0, *through.knots, through.length])

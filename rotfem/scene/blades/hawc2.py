@@ -25,10 +25,12 @@ import numpy as np
 from rotfem.errors import show
 from rotfem.registry import register
 from rotfem.scene.blades.deck import FROM_HAWC2, Asked, BladeFormat, Deck, find_file, line_of, rows_over, turned_matrix
-from rotfem.scene.files import DEEPEST
 from rotfem.scene.section import about_reference, mass_matrices
 from rotfem.scene.table import problem
 from rotfem.scene.values import DIGITS, UPPER, Array, is_positive, symmetric_matrices
+
+#: Files that continue in others, one in the other, at most: a file may name itself.
+DEEPEST = 30
 
 #: Columns of a row with centres, and with a full matrix.
 CENTRES = [

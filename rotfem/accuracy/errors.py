@@ -1,0 +1,367 @@
+"""The error of an answer: its distance to one in steps of twice the length on half the cells.
+
+Let u_h be an answer in steps or cells of size h, of order p. In the asymptotic range
+
+    |u_h − u| = |u_h − u_rh| / (rᵖ − 1)
+
+(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4). Both answers differ in steps and mesh, so the
+smallest rᵖ − 1 of both is taken. Of steps p is 2 at most: higher orders are reduced by stiff components (Hairer &
+Wanner 1996, section IV.15); of elements of degree k it is max(2, k), as strains at corners and thin layers are not
+smooth. The error is the whole distance where that range is not shown:
+
+- the distance is above `ASYMPTOTIC`;
+- a vibration as quick as the difference d is out of phase by more than π/3, ω (ωh)² T/12 in steps h of second order
+  (Hughes 1987, chapter 9), with ω² = ∫|ḋ|² dt / ∫|d|² dt; or the rows do not resolve it;
+- cells cannot be halved. Then the other answer has elements of one degree less, or of one more where those lock.
+
+The error of a theory is the distance of the coarser answer to that of the richest theory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rotfem import registry
+from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
+from rotfem.errors import ComputationError, InputError
+from rotfem.results.distance import Series, Spectrum
+from rotfem.scene import Scene
+
+#: Relative distance of two answers up to which their order is taken to hold; phase error (rad) likewise.
+ASYMPTOTIC, IN_PHASE = 0.05, math.pi / 3
+
+#: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
+BEYOND = 0.75
+
+#: Ratio of the lengths of cells from which on two meshes are compared: that of three cells to two.
+LONGER = 1.5
+
+#: Order of steps that holds for all motions.
+CERTAIN = 2
+
+#: Longest adaptive step as a part of the history (`rotfem.analysis.march.LONGEST`), and the loosest tolerance.
+LONGEST, LOOSEST = 0.05, 0.5
+
+#: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
+FEWER = 0.75
+
+#: Error from which a warning names its cures; error of a theory from which it is warned of.
+NOTICED, OUT_OF_RANGE = 0.01, 0.05
+
+#: Contributions to an error as they are called in text.
+WORDS = {
+    "discretisation": "steps and mesh",
+    "time": "steps",
+    "space": "mesh",
+    "model": "theory",
+    "effects": "effects left out",
+    "round_off": "round-off",
+}
+
+# --- the coarser answer -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Coarser:
+    """A setting to compare with, and the factor rᵖ − 1 by which the error is smaller than the distance to it."""
+
+    setting: Setting
+    factor: float
+
+
+def in_longer_steps(own: Setting, end: float) -> Coarser | None:
+    """Return a setting in steps of twice the length; None where there is none.
+
+    Args:
+        own: of a history.
+        end: of that, s.
+    """
+    order = order_of(own)
+    if own.step is not None:
+        if 2 * own.step > end:
+            return None
+        return Coarser(replace(own, step=2 * own.step), 2.0 ** min(CERTAIN, order) - 1.0)
+    assert own.tolerance is not None
+    tolerance = min(own.tolerance * 2.0**order, LOOSEST)
+    ratio = (tolerance / own.tolerance) ** (1.0 / order)
+    longest = min(2.0 * (own.max_step or LONGEST * end), end)
+    setting = replace(own, tolerance=tolerance, max_step=longest)
+    return Coarser(setting, ratio**CERTAIN - 1.0) if ratio > 1.1 else None
+
+
+def on_other_meshes(own: Setting) -> list[Coarser]:
+    """Return settings on half the cells, of one degree less, and of one more, which is there where elements lock."""
+    degrees = [Coarser(replace(own, degree=own.degree - 1), 1.0)] if own.degree > 1 else []
+    degrees.append(Coarser(replace(own, degree=own.degree + 1), BEYOND))
+    if own.elements is None:
+        return degrees
+    cells = own.elements if isinstance(own.elements, tuple) else (own.elements,)
+    half = tuple((n + 1) // 2 for n in cells)
+    ratio = min(n / m for n, m in zip(cells, half, strict=True))
+    elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
+    fewer = [Coarser(replace(own, elements=elements), ratio ** max(2, own.degree) - 1.0)] if ratio >= LONGER else []
+    return [*fewer, *degrees]
+
+
+def coarser(own: Setting, scene: Scene) -> list[Coarser]:
+    """Return settings that are coarser in steps and mesh, the best one first; none where steps cannot be longer."""
+    meshes = on_other_meshes(own)
+    if not own.moving or scene.time is None:
+        return meshes
+    pairs = [(mesh, in_longer_steps(mesh.setting, scene.time.end)) for mesh in meshes]
+    return [Coarser(both.setting, min(both.factor, mesh.factor)) for mesh, both in pairs if both is not None]
+
+
+def finer(own: Setting) -> Setting:
+    """Return the next finer setting, steps of half the length and twice the cells; of a mesh file a degree more."""
+    out, n = own, own.elements
+    if n is None:
+        out = replace(out, degree=own.degree + 1)
+    else:
+        out = replace(out, elements=(2 * n[0], 2 * n[1]) if isinstance(n, tuple) else 2 * n)
+    if own.step is not None:
+        return replace(out, step=own.step / 2)
+    return out if own.tolerance is None else replace(out, tolerance=own.tolerance / 2 ** order_of(own))
+
+
+def order_of(setting: Setting) -> int:
+    """Return the order of the steps of a history."""
+    order: int = registry.schemes[str(setting.scheme)].order
+    return order
+
+
+# --- the error --------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Errors:
+    """Contributions to the error of an answer, relative to the largest value of its output, or to each frequency.
+
+    Attributes:
+        parts: name (see `WORDS`) ↦ error; None where it is unknown.
+        unknown: why.
+        scale: largest value of the output.
+        at: time of the largest difference, s.
+        each: of every mode: error by the mesh; None where it is unknown.
+        rows: settings with their errors and CPU seconds, of the coarser answer, this one and, extrapolated, the next.
+    """
+
+    parts: dict[str, float | None]
+    unknown: list[str] = field(default_factory=list)
+    scale: float = 0.0
+    at: float | None = None
+    each: Sequence[float | None] = field(default_factory=list)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def total(self) -> float | None:
+        """Sum of the contributions; None where one is unknown."""
+        known = [float(part) for part in self.parts.values() if part is not None]
+        return sum(known) if len(known) == len(self.parts) else None
+
+    def summary(self) -> dict[str, Any]:
+        """Return the table `error` of a summary."""
+        more = {} if self.at is None else {"time_at": self.at}
+        return {**self.parts, "total": self.total, "scale": self.scale, **more}
+
+
+def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
+    """Return the error of an answer.
+
+    Args:
+        answers: of its scene.
+        own: the answer.
+        parts: whether errors of steps and mesh are wanted one by one.
+    """
+    scene, setting, scale = answers.scene, own.setting, own.output.scale
+    out = Errors({}, scale=scale, each=[None] * len(own.output.values) if isinstance(own.output, Spectrum) else [])
+    if parts and setting.moving and scene.time is not None:
+        longer = in_longer_steps(setting, scene.time.end)
+        _compare(out, "time", answers, own, [] if longer is None else [longer])
+        found = _compare(out, "space", answers, own, on_other_meshes(setting))
+    else:
+        found = _compare(out, "discretisation" if setting.moving else "space", answers, own, coarser(setting, scene))
+    if (lost := own.outcome.round_off) is not None:
+        out.parts["round_off"] = lost
+    if not registry.theories[setting.theory].exact:
+        out.parts["model"] = of_theory(out, answers, own, found or own)
+    return out
+
+
+def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list[Coarser]) -> Answer | None:
+    """Add a contribution by the distance to the first of coarser answers that there is; return that."""
+    out.parts[name], found, why = None, None, "there are too few steps to take steps of twice the length"
+    for other in others:
+        found, reason = attempt(answers, other.setting)
+        if found is not None and not has_longer_cells(own, found):
+            found, reason = None, "places that are nodes leave no longer cells"
+        if found is not None:
+            break
+        why = f"{other.setting.words()}: {reason}"
+    if found is None:
+        out.unknown.append(f"there is no coarser answer: {why}")
+        return None
+    apart = distance(own, found)
+    if not math.isfinite(apart.size):
+        out.unknown.append("nothing moves, where it does with a coarser setting")
+        return found
+    holds = other.factor < 1.0 or (apart.size <= ASYMPTOTIC and in_phase(own, found, answers.scene))
+    error = apart.size / other.factor if holds else apart.size
+    if name != "space" and own.outcome.steps > 0 and found.outcome.steps > FEWER * own.outcome.steps:
+        if own.setting.tolerance is None:
+            out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
+            return found
+        error += own.setting.tolerance  # which bounds the error of the steps by what the controller sums
+    if isinstance(own.output, Spectrum):
+        each = [float(e / other.factor if e <= ASYMPTOTIC else e) for e in apart.each]
+        out.each, error = each, max(each, default=0.0)
+    out.parts[name], out.at = error, apart.at if out.at is None else out.at
+    if name != "time":
+        _fill_table(out, own, found, other)
+    return found
+
+
+def has_longer_cells(own: Answer, other: Answer) -> bool:
+    """Return whether each cell of another answer is at least LONGER times as long, or its degree is another one."""
+    if own.setting.degree != other.setting.degree or own.setting.elements == other.setting.elements:
+        return True
+    for here, there in zip(own.outcome.lines, other.outcome.lines, strict=True):
+        middle = (here[1:] + here[:-1]) / 2
+        lengths = np.diff(there)[np.searchsorted(there, middle) - 1] / np.diff(here)
+        if float(lengths.min()) < LONGER * (1 - 1e-9):
+            return False
+    return True
+
+
+def attempt(answers: Answers, setting: Setting) -> tuple[Answer | None, str]:
+    """Return the answer with a setting, or None and why it fails."""
+    try:
+        return answers(setting), ""
+    except (ComputationError, InputError) as error:
+        return None, error.what if isinstance(error, ComputationError) else error.allowed
+
+
+def in_phase(own: Answer, other: Answer, scene: Scene) -> bool:
+    """Return whether a vibration as quick as the difference of two answers in fixed steps stays in phase.
+
+    Of adaptive steps it does: what the coarser answer does not resolve is small against the distance to it.
+    """
+    if own.setting.step is None or scene.time is None or not isinstance(own.output, Series):
+        return True
+    change = own.output.difference(other.output)
+    spaces = np.diff(change.times)
+    size = float(np.sum(np.square(change.values[1:]).sum(axis=1) * spaces))
+    if size == 0.0:
+        return True
+    omega = math.sqrt(float(np.sum(np.square(np.diff(change.values, axis=0)).sum(axis=1) / spaces)) / size)
+    late = omega * (omega * own.setting.step) ** 2 * scene.time.end / 12.0
+    return late <= IN_PHASE and omega * float(np.median(spaces)) <= 1.0
+
+
+def of_theory(out: Errors, answers: Answers, own: Answer, poor: Answer) -> float | None:
+    """Return the error of a theory by an answer of it in a coarse setting; None where it is unknown."""
+    kind = answers.scene.structure.type
+    exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(kind)]
+    if not exact:
+        out.unknown.append(f"there is no exact theory of a {kind}")
+        return None
+    richest = max(exact, key=lambda theory: theory.rank)
+    rich, why = attempt(answers, replace(poor.setting, theory=richest.name))
+    if rich is None:
+        out.unknown.append(f"there is no answer of {richest.name} to compare with: {why}")
+        return None
+    if own.outcome.stable and rich.outcome.stable is False:
+        return 1.0  # above a buckling load that the theory does not have
+    size = distance(rich, poor).size
+    return size if math.isfinite(size) else None
+
+
+# --- what it costs ----------------------------------------------------------------------------------------------------
+
+
+def row(setting: Setting, error: float | None, seconds: float, extrapolated: bool = False) -> dict[str, Any]:
+    """Return a row of the table of settings: `setting`, `error` (relative), `seconds` of CPU, `extrapolated`."""
+    more = {"extrapolated": True} if extrapolated else {}
+    return {"setting": setting.summary(), "words": setting.words(), "error": error, "seconds": seconds, **more}
+
+
+def _fill_table(out: Errors, own: Answer, other: Answer, how: Coarser) -> None:
+    error = out.total
+    if error is None:
+        return
+    out.rows = [row(other.setting, distance(own, other).size, other.seconds), row(own.setting, error, own.seconds)]
+    if how.factor > 1.0:
+        growth = max(1.0, own.seconds / max(other.seconds, 1e-3))
+        out.rows.append(row(finer(own.setting), error / (how.factor + 1.0), own.seconds * growth, True))
+
+
+# --- in words ---------------------------------------------------------------------------------------------------------
+
+
+def percent(ratio: float | None) -> str:
+    """Return a ratio in per cent with two digits, of large ones three."""
+    if ratio is None:
+        return "unknown"
+    return "0 %" if ratio < 5e-9 else f"{100 * ratio:.2g} %" if ratio < 0.995 else f"{100 * ratio:.3g} %"
+
+
+def error_line(summary: Mapping[str, Any]) -> str:
+    """Return the line about `error` of a summary."""
+    parts = ", ".join(f"{WORDS[n]} {percent(summary[n])}" for n in WORDS if n in summary)
+    if summary["total"] is None:
+        return f"error: unknown ({parts})"
+    return f"error (estimated): {percent(summary['total'])} ({parts})"
+
+
+def table_lines(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the table of settings as lines."""
+    if not rows:
+        return []
+    cells = [("setting", "error", "CPU s")]
+    for r in rows:
+        about = "≈ " if r.get("extrapolated") else ""
+        size = r.get("error")
+        error = r.get("failed", "–" if size is None else f"{size:.1e}" if size >= 1e-9 else "0")
+        cells.append((r["words"], about + error, about + f"{r['seconds']:.2g}"))
+    wide = [max(len(line[i]) for line in cells) for i in range(3)]
+    return [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells]
+
+
+def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
+    """Return what is to be known of an error: what is unknown, how to reduce a large one but of modes."""
+    said = [f"the error is unknown: {why}" for why in errors.unknown]
+    model = errors.parts.get("model") or 0.0
+    if model > OUT_OF_RANGE:
+        how = "out of its range" if model >= 1.0 else f"in error by about {100 * model:.2g} %"
+        said.append(f'model.theory = "{own.theory}" is {how} here; "{_exact_name(scene)}" is exact')
+    rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
+    allowed = max(NOTICED, own.tolerance or 0.0)
+    if rest > allowed and not errors.each:
+        cures = ["a higher mesh.degree" if own.elements is None else "more mesh.elements"]
+        if own.step is not None:
+            cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")
+        elif own.tolerance is not None:
+            cures.insert(0, f"time.tolerance = {rounded_down(own.tolerance * allowed / 2 / rest)}")
+        off = (
+            f"the tip may be in error by {percent(rest)} of its largest displacement"
+            if own.moving
+            else (f"the result may be in error by {percent(rest)}")
+        )
+        said.append(f"{off}; to reduce it: {', '.join(cures)}, or --accuracy")
+    return said
+
+
+def _exact_name(scene: Scene) -> str:
+    exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(scene.structure.type)]
+    return str(max(exact, key=lambda theory: theory.rank).name) if exact else ""
+
+
+def rounded_down(x: float) -> str:
+    """Return a positive number with one digit, not above it."""
+    power = 10.0 ** math.floor(math.log10(x))
+    return f"{math.floor(x / power * (1 + 1e-9)) * power:.1g}"

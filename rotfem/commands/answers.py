@@ -1,0 +1,149 @@
+"""What a verb adds to a result: its error, or an accuracy that it is led to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from rotfem.accuracy.answer import Answer, Answers
+from rotfem.accuracy.errors import WORDS, Errors, estimate, warnings_of
+from rotfem.accuracy.refine import Clock, Walk, walk
+from rotfem.commands.interrupts import together
+from rotfem.errors import ComputationError, InputError, Stopped
+from rotfem.listeners import Hint
+from rotfem.results.result import Result
+from rotfem.scene import Scene
+
+R = TypeVar("R", bound=Result)
+
+#: What `accuracy_of` calls the moment at the root.
+ROOT_MOMENT = "root_moment"
+
+
+class Missed(ComputationError):
+    """No setting was found that meets the accuracy."""
+
+
+def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
+    """Refuse an accuracy of something else than what a command computes, by its verb.
+
+    Raises:
+        InputError: the scene asks for another.
+    """
+    if scene.accuracy_of not in (None, *wanted):
+        able = " or ".join(f'"{name}"' for name in wanted)
+        reason = f'is not what "{command}" computes; it must be {able}, or not given'
+        raise InputError("accuracy_of", scene.accuracy_of, reason)
+
+
+def clock_of(scene: Scene, comm: MPI.Comm, announce: Hint | None = None) -> Clock:
+    """Return the clock of a scene's answers; rank 0 decides for all."""
+    return Clock(scene.accuracy_budget, lambda x: float(comm.bcast(x)), announce)
+
+
+def error_of(answers: Answers, own: Answer, comm: MPI.Comm, parts: bool = False) -> Errors | None:
+    """Return the error of an answer; None where Ctrl-C has ended its computation.
+
+    Args:
+        answers: of the scene.
+        own: the answer.
+        comm: of the processes.
+        parts: whether errors of steps and mesh are wanted one by one.
+    """
+    try:
+        return estimate(answers, own, parts)
+    except KeyboardInterrupt as stop:
+        if not together(comm, stop):
+            raise
+        return None
+
+
+def with_error(result: R, errors: Errors | None, own: Answer, scene: Scene, started: float, **more: Any) -> R:
+    """Return a result with `error`, `settings` and the warnings of it in its summary.
+
+    Args:
+        result: without.
+        errors: its error; None if that was interrupted.
+        own: the answer that it is of.
+        scene: of that.
+        started: `perf_counter()` when the error was begun.
+        more: further entries of the summary.
+    """
+    said = ["its error was not estimated: interrupted"] if errors is None else warnings_of(errors, own.setting, scene)
+    found = {} if errors is None else {"error": errors.summary(), "settings": errors.rows}
+    timings = {**result.summary["timings"], "error": perf_counter() - started}
+    return result.with_summary(**found, **more, warnings=[*result.summary["warnings"], *said], timings=timings)
+
+
+def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish: Callable[[Any, Errors], R]) -> R:
+    """Return the first result down the ladder whose error is within the accuracy of a scene.
+
+    Args:
+        answers: of the scene.
+        of: what the error is of.
+        clock: of all answers.
+        comm: of the processes.
+        finish: result, errors ↦ the result with what its verb adds.
+
+    Raises:
+        Missed: none was found; its attribute `result` holds the best that was reached.
+        ComputationError: nothing was reached.
+        Stopped: its attribute `result` holds the best that was reached.
+        KeyboardInterrupt: nothing was, or the ranks do not agree.
+    """
+    scene, found, started = answers.scene, Walk(), perf_counter()
+    assert scene.accuracy is not None
+
+    def best(**entries: Any) -> R:
+        assert found.best is not None
+        answer, errors = found.best
+        result = finish(answer.result(), errors)
+        how: dict[str, Any] = {
+            "asked": scene.accuracy,
+            "of": of,
+            "met": found.met,
+            "estimated": errors.total,
+            "chosen": answer.setting.summary(),
+            "attempts": found.rows,
+        }
+        if clock.budget is not None:
+            how["budget"] = clock.summary()
+        total = perf_counter() - started
+        timings = {**result.summary["timings"], "choice": max(0.0, total - result.summary["timings"]["total"])}
+        more = {"error": errors.summary(), "settings": found.table(), "timings": {**timings, "total": total}}
+        return result.with_summary(scene=scene.digest(), accuracy=how, **more, **entries)
+
+    try:
+        walk(answers, scene.accuracy, clock, found)
+    except KeyboardInterrupt as stop:
+        if found.best is not None and together(comm, stop):
+            raise Stopped(best(status="interrupted")) from stop
+        raise
+    if found.met:
+        return best()
+    assert found.best is not None
+    missed = _missed(scene, found.best[1], found.failure)
+    failure = {"what": missed.what, "time": None, "advice": missed.advice}
+    missed.result = best(status="failed", failure=failure)
+    raise missed
+
+
+def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> Missed:
+    """Return the error that says what the best answer reached instead of an accuracy, and what failed after it."""
+    known = {name: part for name, part in errors.parts.items() if part is not None}
+    unknown = [WORDS[name] for name in errors.parts if name not in known]
+    worst = max(known, key=lambda name: known[name], default="discretisation")
+    advice = {
+        "model": f"a looser accuracy, or a richer model.theory than {scene.model.theory}",
+        "round_off": "a looser accuracy, or a section of less different stiffnesses",
+    }.get(worst, "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""))
+    if unknown:
+        reached = f"the error of what was reached is not known ({', '.join([*unknown, *errors.unknown])})"
+    else:
+        reached = f"an error of {errors.total:.2g} was reached, most of it ({WORDS[worst]}) {known[worst]:.2g}"
+    why = "" if failure is None else f", and a further attempt failed: {failure.what}"
+    what = f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}"
+    return Missed(what, advice=(failure.advice if failure is not None else None) or advice)
