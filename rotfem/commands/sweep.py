@@ -6,6 +6,7 @@ Each worker has points of its own. A point is settled when its summary says done
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -25,16 +26,15 @@ import typer
 from mpi4py import MPI
 
 from rotfem.commands.console import ALONE
-from rotfem.commands.cost.bench import fingerprint
 from rotfem.commands.job import app
 from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
 from rotfem.listeners import ONE_PROCESS, Progress
 from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
-from rotfem.scene import load_scene
+from rotfem.scene import Scene, load_scene
 from rotfem.scene.extensions import load, loaded
-from rotfem.version import versions
+from rotfem.version import __version__, versions
 
 #: Verbs that can be swept.
 VERBS = ("run", "modes", "campbell", "response", "check")
@@ -86,12 +86,20 @@ def _number(text: str) -> Any:
     return text
 
 
+def fingerprint(scene: Scene, verb: str) -> str:
+    """Return a hash of all that a point depends on: scene, verb, version. A mesh file counts by its content."""
+    mesh = getattr(scene.structure, "mesh", None)
+    content = hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh is not None else None
+    text = json.dumps([scene.to_dict(), content, verb, __version__], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
 def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], folder: Path) -> list[Point]:
     """Return the points of all combinations, the last key fastest. Every scene is read."""
     out = []
     for values in product(*keys.values()):
         changes = [f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in zip(keys, values, strict=True)]
-        name = fingerprint(load_scene(scene, changes), " ".join(verb), 1)
+        name = fingerprint(load_scene(scene, changes), " ".join(verb))
         out.append(Point(dict(zip(keys, values, strict=True)), changes, folder / "points" / name))
     return out
 
