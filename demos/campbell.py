@@ -36,8 +36,8 @@ def main(figure: Path | None = None) -> float:
             f"{name:8s} {branch['frequency'][0]:9.4f} … {branch['frequency'][-1]:9.4f} rad/s, share of lag in its "
             f"kinetic energy {shares[0]:.2f} … {shares[-1]:.2f}, least confidence {branch['confidence'].min():.2f}"
         )
-    (meeting,) = [c for c in summary["critical_speeds"] if c["label"] == "lag 1" and c["per_rev"] == 1]
-    report("lag 1 meets 1Ω at", meeting["speed"], REFERENCE, "rad/s")
+    (meeting,) = [c for c in summary["critical_speeds"] if c["label"] == "1st edgewise" and c["per_rev"] == 1]
+    report("1st edgewise meets 1Ω at", meeting["speed"], REFERENCE, "rad/s")
     if figure is not None and FIRST_RANK:
         save(result.plot(), figure)
     return float(meeting["speed"])

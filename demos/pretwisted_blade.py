@@ -8,13 +8,13 @@ a slender blade,
 
     N = ½ m Ω² (L² − X²),
 
-so that v and w are coupled by (EI_3 − EI_2) sin β cos β. Without twist, flap 1 rises faster than lag 1, for N stiffens
-both but m Ω² softens lag only, and *crosses* it. With twist the two *veer*: they come close, exchange their character,
-and do not cross. A branch keeps the name it had at rest; what it is at a speed is told by its shares of the kinetic
-energy and by its `mode` there.
+so that v and w are coupled by (EI_3 − EI_2) sin β cos β. Without twist, the 1st flapwise mode rises faster than the
+1st edgewise one, for N stiffens both but m Ω² softens lag only, and *crosses* it. With twist the two *veer*: they come
+close, exchange their character, and do not cross. A branch keeps the name it had at rest; what it is at a speed is
+told by its shares of the kinetic energy and by its `mode` there.
 
-The number is the lowest frequency at 12 rad/s, lag with a trace of flap, though its branch is flap 1. As a check, the
-blade without twist has the flap frequencies of Wright et al. 1982.
+The number is the lowest frequency at 12 rad/s, lag with a trace of flap, though its branch is 1st flapwise. As a check,
+the blade without twist has the flap frequencies of Wright et al. 1982.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import rotfem
 
 SCENE = Path(__file__).with_name("pretwisted_blade.toml")
 REFERENCE = 11.8603317  # rad/s; Legendre–Ritz of W with 14 … 22 functions a field, no shear and no stretch
-WRIGHT = (13.170, 37.603, 79.615)  # rad/s: flap 1, 2, 3 at 12 rad/s without twist; table 1 of the paper
+WRIGHT = (13.170, 37.603, 79.615)  # rad/s: 1st flapwise, 2, 3 at 12 rad/s without twist; table 1 of the paper
 
 Branches = dict[str, dict[str, np.ndarray]]
 
@@ -39,7 +39,7 @@ def main(figure: Path | None = None) -> float:
     """Return the lowest frequency (rad/s) of the pretwisted blade at 12 rad/s."""
     scene = rotfem.load_scene(SCENE)
     straight = rotfem.campbell(scene.replace({"structure.pretwist": 0.0}), "0:12:25", orders=1).branches()
-    for name, printed in zip(("flap 1", "flap 2", "flap 3"), WRIGHT, strict=True):
+    for name, printed in zip(("1st flapwise", "2nd flapwise", "3rd flapwise"), WRIGHT, strict=True):
         say(f"without twist, {name} at 12 rad/s: {straight[name]['frequency'][-1]:.3f} rad/s, printed {printed:.3f}")
     result = rotfem.campbell(scene, "0:12:25", orders=1)
     twisted = result.branches()
@@ -50,10 +50,10 @@ def main(figure: Path | None = None) -> float:
             f"{name:12s} {f[0]:8.4f} … {f[-1]:8.4f} rad/s, share of lag {lag[0]:.2f} … {lag[-1]:.2f}: "
             f"{last[name]} at 12 rad/s, least confidence {branch['confidence'].min():.2f}"
         )
-    flap, lag = twisted["flap 1"], twisted["lag 1"]
+    flap, lag = twisted["1st flapwise"], twisted["1st edgewise"]
     gap = lag["frequency"] - flap["frequency"]
     nearest = int(np.argmin(gap))
-    say(f"flap 1 and lag 1 come as close as {gap[nearest]:.3f} rad/s, at {flap['speed'][nearest]:.2f} rad/s")
+    say(f"1st flapwise and 1st edgewise come to {gap[nearest]:.3f} rad/s, at {flap['speed'][nearest]:.2f} rad/s")
     lowest = float(flap["frequency"][-1])
     report("lowest frequency at 12 rad/s", lowest, REFERENCE, "rad/s")
     if figure is not None and FIRST_RANK:
@@ -62,7 +62,7 @@ def main(figure: Path | None = None) -> float:
 
 
 def plot(straight: Branches, twisted: Branches, path: Path) -> None:
-    """Draw the frequencies of both blades over the speed, and what flap 1 and lag 1 are made of."""
+    """Draw the frequencies of both blades over the speed, and what 1st flapwise and 1st edgewise are made of."""
     picture = Figure(figsize=(10, 6), layout="constrained")
     grid = picture.add_gridspec(2, 2, width_ratios=(3, 2))
     whole, close = picture.add_subplot(grid[:, 0]), picture.add_subplot(grid[0, 1])
@@ -71,7 +71,7 @@ def plot(straight: Branches, twisted: Branches, path: Path) -> None:
         draw(whole, twisted[name], "frequency", f"C{i}", name)
     for i, branch in enumerate(straight.values()):
         draw(whole, branch, "frequency", None, "without twist" if i == 0 else None)
-    for i, name in enumerate(("flap 1", "lag 1")):
+    for i, name in enumerate(("1st flapwise", "1st edgewise")):
         for axis, column in ((close, "frequency"), (shares, "share_lag")):
             draw(axis, straight[name], column, None, None)
             draw(axis, twisted[name], column, f"C{i}", name)
@@ -79,7 +79,7 @@ def plot(straight: Branches, twisted: Branches, path: Path) -> None:
     whole.legend(fontsize="small", loc="upper left", ncols=3)
     whole.set_title("Campbell diagram, 45° of pretwist")
     close.set(ylabel="frequency (rad/s)", xlim=(8, 12), ylim=(9, 13.5))
-    close.set_title("Flap 1 and lag 1 exchange their character")
+    close.set_title("1st flapwise and 1st edgewise exchange their character")
     shares.set(xlabel="speed Ω (rad/s)", ylabel="share of lag", ylim=(-0.03, 1.03))
     save(picture, path)
 

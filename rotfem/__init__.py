@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from rotfem.mechanics.effects import Effect as Effect
     from rotfem.mechanics.free_hub import FreeHub as FreeHub
     from rotfem.mechanics.free_hub import Torque as Torque
-    from rotfem.mechanics.loads import ConstantLoad as ConstantLoad
-    from rotfem.mechanics.loads import Loads as Loads
     from rotfem.mechanics.motion import Motion as Motion
     from rotfem.mechanics.motion import MotionLaw as MotionLaw
     from rotfem.mechanics.problem import Output as Output
@@ -63,6 +61,7 @@ if TYPE_CHECKING:
     from rotfem.scene.blades.deck import Asked as Asked
     from rotfem.scene.blades.deck import BladeFormat as BladeFormat
     from rotfem.scene.blades.deck import Deck as Deck
+    from rotfem.scene.loads import Loads as Loads
     from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry as Geometry
     from rotfem.scene.section_shapes import Shape as Shape

@@ -27,6 +27,11 @@ def cpu_time() -> float:
     return process_time() + called.children_user + called.children_system
 
 
+def computing() -> float:
+    """Return the CPU time (s) so far, without that of compilation."""
+    return cpu_time() - Compiling.seconds
+
+
 class Compiling:
     """What compilation of forms has taken so far.
 

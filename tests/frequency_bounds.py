@@ -127,7 +127,7 @@ def in_the_limit() -> Iterator[Row]:
 
 def column(result: ModesResult, name: str) -> Any:
     """Return a column of the first three modes that do not stretch or shear the axis or mid-surface."""
-    return np.array([row[name] for row in result.rows if not row["label"].startswith(("axial", "in-plane"))][:3])
+    return np.array([row[name] for row in result.rows if not row["label"].endswith(("axial", "in-plane"))][:3])
 
 
 def of_modes(scene: dict[str, Any]) -> tuple[Any, Any]:

@@ -85,6 +85,6 @@ f, df, ddf = s**powers, powers * s ** (powers - 1) / length, powers * (powers - 
 K, M = (w * EI * ddf) @ ddf.T + (w * N * df) @ df.T, (w * m * f) @ f.T
 flap = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real.min())
 
-computed = next(f for f, label in zip(modes.frequencies, modes.labels, strict=True) if label == "flap 1")
+computed = next(f for f, label in zip(modes.frequencies, modes.labels, strict=True) if label == "1st flapwise")
 print(f"first flap {computed:.5f} rad/s, Rayleigh {flap:.5f} rad/s")
 assert abs(computed / flap - 1) < 1e-3

@@ -117,6 +117,11 @@ class Outcome(Protocol):
         ...
 
     @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of all vertices of the mesh along each axis."""
+        ...
+
+    @property
     def round_off(self) -> float | None:
         """Bound of the error by round-off, relative; None where none is known."""
         ...

@@ -38,6 +38,9 @@ ASYMPTOTIC, IN_PHASE = 0.05, math.pi / 3
 #: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
 BEYOND = 0.75
 
+#: Ratio of the lengths of cells from which on two meshes are compared: that of three cells to two.
+LONGER = 1.5
+
 #: Order of steps that holds for all motions.
 CERTAIN = 2
 
@@ -65,17 +68,10 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Coarser:
-    """A setting to compare with.
-
-    Attributes:
-        setting: in longer steps, on fewer cells.
-        factor: rᵖ − 1, by which the error is smaller than the distance.
-        instead: where that cannot be computed, as elements lock, a setting of one degree more.
-    """
+    """A setting to compare with, and the factor rᵖ − 1 by which the error is smaller than the distance to it."""
 
     setting: Setting
     factor: float
-    instead: Setting | None = None
 
 
 def in_longer_steps(own: Setting, end: float) -> Coarser | None:
@@ -98,29 +94,27 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
     return Coarser(setting, ratio**CERTAIN - 1.0) if ratio > 1.1 else None
 
 
-def on_fewer_cells(own: Setting) -> Coarser:
-    """Return a setting on half the cells, or of one degree less."""
-    if own.elements is not None:
-        cells = own.elements if isinstance(own.elements, tuple) else (own.elements,)
-        half = tuple((n + 1) // 2 for n in cells)
-        ratio = min(n / m for n, m in zip(cells, half, strict=True))
-        if ratio >= 1.5:  # from three cells to two
-            elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
-            return Coarser(replace(own, elements=elements), ratio ** max(2, own.degree) - 1.0)
-    lower, higher = (replace(own, degree=own.degree + more) for more in (-1, 1))
-    return Coarser(lower, 1.0, higher) if own.degree > 1 else Coarser(higher, BEYOND)
+def on_other_meshes(own: Setting) -> list[Coarser]:
+    """Return settings on half the cells, of one degree less, and of one more, which is there where elements lock."""
+    degrees = [Coarser(replace(own, degree=own.degree - 1), 1.0)] if own.degree > 1 else []
+    degrees.append(Coarser(replace(own, degree=own.degree + 1), BEYOND))
+    if own.elements is None:
+        return degrees
+    cells = own.elements if isinstance(own.elements, tuple) else (own.elements,)
+    half = tuple((n + 1) // 2 for n in cells)
+    ratio = min(n / m for n, m in zip(cells, half, strict=True))
+    elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
+    fewer = [Coarser(replace(own, elements=elements), ratio ** max(2, own.degree) - 1.0)] if ratio >= LONGER else []
+    return [*fewer, *degrees]
 
 
-def coarser(own: Setting, scene: Scene) -> Coarser | None:
-    """Return a setting that is coarser in steps and mesh; None where steps cannot be longer."""
-    mesh = on_fewer_cells(own)
+def coarser(own: Setting, scene: Scene) -> list[Coarser]:
+    """Return settings that are coarser in steps and mesh, the best one first; none where steps cannot be longer."""
+    meshes = on_other_meshes(own)
     if not own.moving or scene.time is None:
-        return mesh
-    both, end = in_longer_steps(mesh.setting, scene.time.end), scene.time.end
-    if both is None:
-        return None
-    instead = None if mesh.instead is None else in_longer_steps(mesh.instead, end)
-    return Coarser(both.setting, min(both.factor, mesh.factor), None if instead is None else instead.setting)
+        return meshes
+    pairs = [(mesh, in_longer_steps(mesh.setting, scene.time.end)) for mesh in meshes]
+    return [Coarser(both.setting, min(both.factor, mesh.factor)) for mesh, both in pairs if both is not None]
 
 
 def finer(own: Setting) -> Setting:
@@ -185,32 +179,32 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         parts: whether errors of steps and mesh are wanted one by one.
     """
     scene, setting, scale = answers.scene, own.setting, own.output.scale
-    out = Errors({}, scale=scale, each=[None] * len(own.output.values))
-    other = coarser(setting, scene)
+    out = Errors({}, scale=scale, each=[None] * len(own.output.values) if isinstance(own.output, Spectrum) else [])
     if parts and setting.moving and scene.time is not None:
-        _compare(out, "time", answers, own, in_longer_steps(setting, scene.time.end))
-        _compare(out, "space", answers, own, on_fewer_cells(setting))
+        longer = in_longer_steps(setting, scene.time.end)
+        _compare(out, "time", answers, own, [] if longer is None else [longer])
+        found = _compare(out, "space", answers, own, on_other_meshes(setting))
     else:
-        found = _compare(out, "discretisation" if setting.moving else "space", answers, own, other)
-        if found is not None and other is not None:
-            _fill_table(out, own, found, other)
+        found = _compare(out, "discretisation" if setting.moving else "space", answers, own, coarser(setting, scene))
+    if (lost := own.outcome.round_off) is not None:
+        out.parts["round_off"] = lost
     if not registry.theories[setting.theory].exact:
-        out.parts["model"] = of_theory(out, answers, own, (other or on_fewer_cells(setting)).setting)
+        out.parts["model"] = of_theory(out, answers, own, found or own)
     return out
 
 
-def _compare(out: Errors, name: str, answers: Answers, own: Answer, other: Coarser | None) -> Answer | None:
-    """Add a contribution by the distance to a coarser answer; return that."""
-    out.parts[name] = None
-    if other is None:
-        out.unknown.append("there are too few steps to take steps of twice the length")
-        return None
-    found, why = attempt(answers, other.setting)
-    if found is None and other.instead is not None:  # elements of a lower degree lock
-        found, _ = attempt(answers, other.instead)
-        other = Coarser(other.instead, BEYOND)
+def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list[Coarser]) -> Answer | None:
+    """Add a contribution by the distance to the first of coarser answers that there is; return that."""
+    out.parts[name], found, why = None, None, "there are too few steps to take steps of twice the length"
+    for other in others:
+        found, reason = attempt(answers, other.setting)
+        if found is not None and not has_longer_cells(own, found):
+            found, reason = None, "places that are nodes leave no longer cells"
+        if found is not None:
+            break
+        why = f"{other.setting.words()}: {reason}"
     if found is None:
-        out.unknown.append(f"with {other.setting.words()} the computation fails: {why}")
+        out.unknown.append(f"there is no coarser answer: {why}")
         return None
     apart = distance(own, found)
     if not math.isfinite(apart.size):
@@ -227,7 +221,21 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, other: Coars
         each = [float(e / other.factor if e <= ASYMPTOTIC else e) for e in apart.each]
         out.each, error = each, max(each, default=0.0)
     out.parts[name], out.at = error, apart.at if out.at is None else out.at
+    if name != "time":
+        _fill_table(out, own, found, other)
     return found
+
+
+def has_longer_cells(own: Answer, other: Answer) -> bool:
+    """Return whether each cell of another answer is at least LONGER times as long, or its degree is another one."""
+    if own.setting.degree != other.setting.degree or own.setting.elements == other.setting.elements:
+        return True
+    for here, there in zip(own.outcome.lines, other.outcome.lines, strict=True):
+        middle = (here[1:] + here[:-1]) / 2
+        lengths = np.diff(there)[np.searchsorted(there, middle) - 1] / np.diff(here)
+        if float(lengths.min()) < LONGER * (1 - 1e-9):
+            return False
+    return True
 
 
 def attempt(answers: Answers, setting: Setting) -> tuple[Answer | None, str]:
@@ -255,18 +263,17 @@ def in_phase(own: Answer, other: Answer, scene: Scene) -> bool:
     return late <= IN_PHASE and omega * float(np.median(spaces)) <= 1.0
 
 
-def of_theory(out: Errors, answers: Answers, own: Answer, setting: Setting) -> float | None:
-    """Return the error of a theory, in a coarse setting; None where it is unknown."""
+def of_theory(out: Errors, answers: Answers, own: Answer, poor: Answer) -> float | None:
+    """Return the error of a theory by an answer of it in a coarse setting; None where it is unknown."""
     kind = answers.scene.structure.type
     exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(kind)]
     if not exact:
         out.unknown.append(f"there is no exact theory of a {kind}")
         return None
     richest = max(exact, key=lambda theory: theory.rank)
-    poor, why = attempt(answers, setting)
-    rich, reason = attempt(answers, replace(setting, theory=richest.name))
-    if poor is None or rich is None:
-        out.unknown.append(f"there is no answer of {richest.name} to compare with: {why or reason}")
+    rich, why = attempt(answers, replace(poor.setting, theory=richest.name))
+    if rich is None:
+        out.unknown.append(f"there is no answer of {richest.name} to compare with: {why}")
         return None
     if own.outcome.stable and rich.outcome.stable is False:
         return 1.0  # above a buckling load that the theory does not have
@@ -325,7 +332,7 @@ def table_lines(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
-    """Return what is to be known of an error: what is unknown, and how to reduce a large one."""
+    """Return what is to be known of an error: what is unknown, how to reduce a large one but of modes."""
     said = [f"the error is unknown: {why}" for why in errors.unknown]
     model = errors.parts.get("model") or 0.0
     if model > OUT_OF_RANGE:
@@ -333,7 +340,7 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
         said.append(f'model.theory = "{own.theory}" is {how} here; "{_exact_name(scene)}" is exact')
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
     allowed = max(NOTICED, own.tolerance or 0.0)
-    if rest > allowed:
+    if rest > allowed and not errors.each:
         cures = ["a higher mesh.degree" if own.elements is None else "more mesh.elements"]
         if own.step is not None:
             cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")

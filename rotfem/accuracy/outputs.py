@@ -47,3 +47,12 @@ def of_columns(name: str, history: Mapping[str, Array], structure: Any) -> Array
     if name == "tip":
         return np.asarray(np.column_stack([history[f"tip_{c}"] for c in structure.components]) * structure.lever)
     return np.column_stack([x for column, x in history.items() if column.startswith("root_m")])
+
+
+def lines(system: Any) -> list[Array]:
+    """Return the coordinates (m) of all vertices of a mesh along each axis, each once and in order."""
+    mesh, out = system.structure.mesh, list[Array]()
+    for axis in range(mesh.topology.dim):
+        x = np.unique(np.concatenate(system.comm.allgather(np.unique(mesh.geometry.x[:, axis]))))
+        out.append(x[np.append(True, np.diff(x) > 1e-9 * np.ptp(x))])  # nearer ones are on one line
+    return out

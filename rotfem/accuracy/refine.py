@@ -18,6 +18,7 @@ from rotfem.accuracy.errors import ASYMPTOTIC, Errors, attempt, of_theory, row
 from rotfem.accuracy.ladder import TOLERANCES, ladder
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
+from rotfem.results.distance import Spectrum
 
 #: Factor of an extrapolated error.
 SAFETY = 1.5
@@ -195,6 +196,8 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
             there, q = distance(answer, before[1]), TOLERANCES[before[0]] / TOLERANCES[rung]
             errors.parts[name] = reduced(there.size, apart, q)
             errors.at, apart = there.at, there.size
+            if isinstance(answer.output, Spectrum) and apart > 0.0:
+                errors.each = [float(e * (errors.parts[name] or 0.0) / apart) for e in there.each]
             if len(found.rows) == 1 and math.isfinite(apart):
                 found.rows[0]["error"] = apart  # that of the first, but for the error of this one
         errors.parts |= model.parts
@@ -255,7 +258,7 @@ def chosen_theory(answers: Answers, first: Answer, accuracy: float) -> tuple[str
     scene, own = answers.scene, registry.theories[first.setting.theory]
     if not own.exact:
         errors = Errors({})
-        return own.name, _Model({"model": of_theory(errors, answers, first, first.setting)}, tuple(errors.unknown))
+        return own.name, _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))
     length = scene.structure.length
     if answers.moving and scene.accuracy_of != "root_moment" and length and first.output.scale <= accuracy * length:
         kind = scene.structure.type

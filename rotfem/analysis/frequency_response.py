@@ -4,17 +4,11 @@ A load Re(f̂ e^{iωt}) on (M, C, K) leaves, once everything else has died out, 
 
     (K + iω C − ω² M) q̂ = f̂
 
-solved at every frequency (the direct response), or from the pairs of the pencil with their left vectors,
+solved at every frequency. With y = G_K q + G_C q̇ + G_M q̈ + d f the complex amplitude of an output is, s = iω,
 
-    q̂ = Σ_j x_j y_j^H f̂ / (n_j (iω − λ_j)),   n_j = y_j^H (2 λ_j M + C) x_j,
+    ŷ = (G_K + s G_C + s² G_M) q̂ + d f̂.
 
-over some λ_j and their conjugates, with the static response of all others added (the modal response).
-
-With y = G_K q + G_C q̇ + G_M q̈ + d f of small motions x e^{st}, the complex amplitude of an output is
-
-    ŷ = (G_K + s G_C + s² G_M) x + d f̂.
-
-Outputs `read` the first part, of a forced motion with s = iω, of a mode with s = λ; the second is `given`.
+Outputs `read` the first part; the second is `given`.
 """
 
 from __future__ import annotations
@@ -76,55 +70,15 @@ class FrequencyResponse:
         self._solver = ComplexSolver((pencil.K, pencil.C, pencil.M))
 
     def direct(self, omega: float) -> Array:
-        """Return the complex amplitudes of the outputs at a frequency (rad/s), from one solution.
+        """Return the complex amplitudes of the outputs at a frequency (rad/s).
 
         Raises:
             ComputationError: there is no answer, at the frequency of a mode that has no damping.
         """
         self._solver.factor((1.0, 1j * omega, -(omega**2)))
-        return np.asarray(self._read(self._solver.solve(self.force), 1j * omega) + self._given)
-
-    def _read(self, x: Array, s: complex) -> Array:
-        return np.concatenate([output.read(x, s) for output in self._outputs])
-
-    def modal(self, frequencies: Array, count: int) -> Array:
-        """Return the amplitudes of the outputs at frequencies (n,), rad/s, by modes; shape (n, outputs).
-
-        Args:
-            frequencies: rad/s.
-            count: modes taken; what all others answer statically is added.
-        """
-        first = self.spinning.modal_basis(count)
-        pairs, n = first.pairs, np.diag(first.own)
-        seen = np.array([self._read(x, s) for x, s in zip(pairs.right.T, pairs.values, strict=True)]).T
-        gains = self._summed(pairs.left.conj().T @ self.force) / n
-        others = self._summed(pairs.left.T @ self.force) / n.conj()  # of the conjugate pairs
-        twice = pairs.values.imag > 0.0
-
-        def at(omega: float) -> Array:
-            plain = seen @ (gains / (1j * omega - pairs.values))
-            mirrored = seen.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
-            return np.asarray(plain + mirrored)
-
-        rest = self._correction(at)
-        return np.array([at(omega) + rest(omega) for omega in frequencies])
-
-    def _correction(self, at: Callable[[float], Array]) -> Callable[[float], Array]:
-        """Return the response of all other modes over frequency: static, or of a motion without stiffness.
-
-        Args:
-            at: response of the computed modes, a function of the frequency.
-        """
-        if not self.loose:
-            static = self.direct(0.0) - at(0.0)
-            return lambda omega: static
-        sizes = np.abs(self.spinning.pairs.resolved.imag)
-        known = np.array([0.2, 0.4, 0.6]) * float(
-            np.min(sizes[sizes > 0.0], initial=np.max(np.abs(self.spinning.pairs.values)))
-        )
-        powers = np.array([[1.0, 1 / (1j * w), 1 / (1j * w) ** 2] for w in known])
-        parts = np.linalg.solve(powers, np.array([self.direct(w) - at(w) for w in known]))
-        return lambda omega: np.asarray(np.array([1.0, 1 / (1j * omega), 1 / (1j * omega) ** 2]) @ parts)
+        x = self._solver.solve(self.force)
+        read = np.concatenate([output.read(x, 1j * omega) for output in self._outputs])
+        return np.asarray(read + self._given)
 
     def peaks(self, low: float, high: float) -> tuple[Array, list[int]]:
         """Return frequencies (rad/s) by which the peaks between two are seen, and which modes there have no damping."""
@@ -141,9 +95,6 @@ class FrequencyResponse:
                 found.append(omega + width * ABOUT_PEAK)
         points = np.concatenate([*found, np.empty(0)])
         return points[(points >= low) & (points <= high)], undamped
-
-    def _summed(self, local: Array) -> Array:
-        return np.asarray(summed(self.analysis.comm, local))
 
 
 def tip_output(system: Any) -> Output:

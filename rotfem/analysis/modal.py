@@ -36,7 +36,7 @@ from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
-from rotfem.structures.mode_names import Wave, with_overdamped, with_whirl
+from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
 
 Array = npt.NDArray[Any]
 
@@ -414,17 +414,13 @@ class Described:
         return found
 
     @cached_property
-    def names(self) -> list[str]:
-        """The name "kind n" of every mode, as its structure counts them; mixed ones name both families.
-
-        Of a rotor the direction follows: "bending 1 backward".
-        """
+    def names(self) -> list[ModeName]:
+        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
         families, out = [name for name in self.shares if name != "hub"], []
         for j, x in enumerate(self._right.T):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            kind, number = self._structure.mode_name(first, *self._structure.nodes(x))
-            mixed = others and self.shares[first][j] < 0.8
-            out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
+            name = self._structure.mode_name(first, *self._structure.nodes(x))
+            out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)
         pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]

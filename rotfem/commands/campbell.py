@@ -6,6 +6,7 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -16,14 +17,16 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.accuracy.answer import Setting
+from rotfem.accuracy.errors import Errors, warnings_of
+from rotfem.accuracy.modes import modal_errors
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import in_basis
 from rotfem.commands.advice import frozen_inputs
-from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
+from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.commands.recorder import check_rows
@@ -31,12 +34,11 @@ from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
-from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.results import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST
-from rotfem.structures.mode_names import distinct, engineers_name
+from rotfem.structures.mode_names import distinct
 from rotfem.units import speed_text, split_unit
 from rotfem.version import __version__
 
@@ -161,7 +163,7 @@ def diagram(
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
-    reduced = in_basis(analysis, values, count + SPARE)
+    own, reduced = analysis, in_basis(analysis, values, count + SPARE)
     analysis = reduced or analysis
     sweep = Sweep(analysis, count, only)
     if reduced is not None:
@@ -190,31 +192,29 @@ def diagram(
         orders, crossings, onsets = meetings(sweep, scene)
     count = sweep.count
     labels = branch_labels(analysis, sweep, count)
-    mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
+    errors = branch_errors(scene, own, analysis, sweep, count) if analysis.estimates else None
+    mesh = None if errors is None else errors.each
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
     for crossing in crossings:
-        label = labels[crossing["branch"] - 1]
-        crossing |= {"label": label, "name": engineers_name(label)}
+        crossing["label"] = labels[crossing["branch"] - 1]
     last = sweep.points[-1].spinning.first(count)
     of_last = {} if mesh is None else dict(zip(sweep.points[-1].order, mesh, strict=False))
     known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
-    off = theory_error(analysis, last)
     warnings = [
         *advice(analysis, fastest),
         *frozen_inputs(analysis.problem),
         *remarks(sweep, labels, onsets, mode_rows(analysis, last, known)),
         *([] if stopped is None else [stopped_after(sweep, values, kept)]),
-        *([off.warning()] if off and off.warning() else []),
+        *([] if errors is None else warnings_of(errors, Setting.of(scene, moving=False), scene)),
     ]
     summary = {
-        **modal_summary("campbell", analysis, scene, started, off),
+        **modal_summary("campbell", analysis, scene, started),
         **({} if stopped is None else {"status": "failed" if isinstance(stopped, ComputationError) else "interrupted"}),
         "branches": [
             {
                 "branch": b + 1,
                 "label": labels[b],
-                "name": engineers_name(labels[b]),
                 "confidence": min(float(point.confidence[b]) for point in sweep.points),
                 "frequency_first": _finite(sweep.points[0].value(b).imag),
                 "frequency_last": _finite(sweep.points[-1].value(b).imag),
@@ -231,7 +231,7 @@ def diagram(
         "speeds": len(values),
         "speeds_inserted": sweep.inserted,
         "speeds_solved": sweep.solves,
-        **({"error": error_of_modes(rows, off).summary()} if analysis.estimates else {}),
+        **({} if errors is None else {"error": errors.summary()}),
         "checks": self_checks(analysis, sweep.points[-1].spinning),
         **analysis.report(),
         "lowest_frequency": min((w for w in sweep.found() if w > 0), default=0.0),
@@ -376,15 +376,17 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
-    """Return the relative error of each branch by the mesh, the larger one of those at both ends of the diagram."""
-    errors, found = FrequencyErrors(analysis), list[list[float]]()
+def branch_errors(scene: Scene, analysis: ModalAnalysis, solved: ModalAnalysis, sweep: Sweep, count: int) -> Errors:
+    """Return the errors of the branches, the larger ones of those at both ends; `each` is that by the mesh."""
+    found, each = list[Errors](), list[list[float]]()
     for point in (sweep.points[0], sweep.points[-1]):
         order = [int(i) for i in point.order[:count]]
         # What the mesh does to modes far above would be taken for errors of these.
-        there = errors(point.spinning.first(1 + max(order)))
-        found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
-    return list(map(_finite, np.fmax(*np.array(found))))
+        found.append(modal_errors(scene, analysis, point.spinning.first(1 + max(order)), solved))
+        there = found[-1].each
+        each.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
+    worst = max(found, key=lambda errors: np.inf if errors.total is None else errors.total)
+    return replace(worst, each=list(map(_finite, np.fmax(*np.array(each)))))
 
 
 def point_rows(

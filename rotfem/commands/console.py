@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from textwrap import wrap
 from time import monotonic, sleep
-from typing import TYPE_CHECKING, Any, NoReturn, TextIO
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from rotfem import units
 from rotfem.commands.interrupts import together
@@ -43,9 +43,9 @@ def missing() -> str:
     return absent and f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"
 
 
-def fitted(text: str, stream: TextIO) -> str:
+def folded(text: str, at_terminal: bool) -> str:
     """Return a text with its lines folded to the width of the terminal; as it is where there is none."""
-    if not stream.isatty():
+    if not at_terminal:
         return text
     width = shutil.get_terminal_size().columns
     folds: dict[str, Any] = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
@@ -159,12 +159,7 @@ class Session:
             raise SceneError("command line", option, str(path), reason)
 
     def start(self, title: str, unit: str = "rad/s") -> None:
-        """Begin to show progress.
-
-        Args:
-            title: of the computation.
-            unit: of speeds in messages.
-        """
+        """Begin to show progress; messages have speeds in the unit, too."""
         units.SPEED.set(unit)
         self.bar = ProgressBar(title, self.first and not self.quiet and not self.as_json)
         self.bar.start()
@@ -179,15 +174,7 @@ class Session:
         return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
 
     def finish(self, result: Result, plots: bool, further: Sequence[Writer] = (), last: bool = True) -> None:
-        """Write a result, its figures and what else is wanted; print its summary if --json asks, or its report.
-
-        Of a computation that has failed nothing but warnings is reported. If it is not the last word, the error is
-        still to come (see `complete`).
-
-        Raises:
-            OutputError: a file cannot be written; those that can are.
-            SceneError: something further cannot be made.
-        """
+        """Write a result, its figures and what else is wanted; print it unless it failed. The last one is complete."""
         from rotfem.commands.printed import report
 
         assert self._folder is not None
@@ -203,12 +190,7 @@ class Session:
             self.say([*report(result), f"results in {self._folder.path}"])
 
     def complete(self, result: Result, further: Sequence[Writer] = ()) -> None:
-        """Write the summary of a result again, now with its error, and what else is wanted; print the error.
-
-        Raises:
-            OutputError: a file cannot be written.
-            SceneError: something further cannot be made.
-        """
+        """Write the summary of a result again, now with its error, and what else is wanted; print the error."""
         from rotfem.commands.printed import of_error
 
         assert self._folder is not None
@@ -239,7 +221,7 @@ class Session:
         """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
             self.bar.stop()
-            print(fitted("\n".join(map(printable, lines)), sys.stdout))
+            print(folded("\n".join(map(printable, lines)), sys.stdout.isatty()))
 
 
 class ProgressBar:
@@ -253,7 +235,7 @@ class ProgressBar:
     def __init__(self, title: str = "", wanted: bool = False):
         self._title, self._wanted = title, wanted
         self._bar: Any = None
-        self._log = logging.getLogger("rotfem.compilation")
+        self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
         self._started, self._due = monotonic(), LONG
         #: When (s after the start) the first share was done, and that share.
         self._first: tuple[float, float] | None = None
@@ -270,7 +252,6 @@ class ProgressBar:
         self._bar = Progress(*columns, percent, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
         self._bar.add_task(self._title, total=None, percent="")
         self._bar.start()
-        self._log.setLevel(logging.INFO)
         self._log.addFilter(self._heard)
 
     def stop(self) -> None:
@@ -281,9 +262,10 @@ class ProgressBar:
             self._log.removeFilter(self._heard)
 
     def _heard(self, record: logging.LogRecord) -> bool:
-        """Say in the bar what a log says, and nowhere else."""
-        self.describe(record.getMessage())
-        return False
+        """Say in the bar that something is compiled, where FFCx's log says so, and nowhere else."""
+        if "Compiler stage" in record.getMessage():
+            self.describe("compiling (first run only)")
+        return record.levelno > logging.INFO
 
     def describe(self, what: str) -> None:
         """Say what is being done."""
@@ -292,11 +274,10 @@ class ProgressBar:
 
     def print(self, line: str) -> None:
         """Print a line, above the bar if there is one."""
-        text = fitted(line, sys.__stderr__ or sys.stderr)  # the bar has another one in its place
         if self._bar is not None:
-            self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._bar.console.print(folded(line, True), markup=False, highlight=False, soft_wrap=True)
         else:
-            print(text, file=sys.stderr, flush=True)
+            print(folded(line, sys.stderr.isatty()), file=sys.stderr, flush=True)
 
     def says(self, line: str) -> None:
         """Print a line that is a kind of progress."""

@@ -10,16 +10,21 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.commands.fields import modes_writer, surface_of
-from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.results import ModesResult
-from rotfem.structures.mode_names import Wave, distinct, engineers_name
+from rotfem.structures.mode_names import Wave, distinct
 from rotfem.units import speed_text
 
 Array = npt.NDArray[Any]
 
 
 def mode_tables(
-    analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True, formats: tuple[str, ...] | None = None
+    analysis: ModalAnalysis,
+    speed: float,
+    count: int,
+    *,
+    keep: bool = True,
+    formats: tuple[str, ...] | None = None,
+    found: Spinning | None = None,
 ) -> ModesResult:
     """Return the first modes at a speed, with warnings of the model and of instabilities.
 
@@ -29,27 +34,25 @@ def mode_tables(
         count: number of modes, that of a rigid body among them.
         keep: whether the matrices must outlast another solution.
         formats: of the files for ParaView that are wanted; None of a structure that may have no surface.
+        found: the modes, where they are computed already.
 
     Raises:
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
-    errors = FrequencyErrors(analysis) if analysis.estimates else None
-    near = None if errors is None else errors.near(speed, count)
-    found = analysis.at(speed, count, keep=keep, near=near)
+    found = found or analysis.at(speed, count, keep=keep)
     rigid = int(found.rigid)
     spinning = found.first(count - rigid)
-    rows = mode_rows(analysis, spinning, None if errors is None else errors(spinning))
+    rows = mode_rows(analysis, spinning)
     synchronous = critical(rows, speed, analysis.fixed is not None)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous, *doubtful(rows)]
+    warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
     if rigid:  # hub and structure turn together, λ = 0
-        columns = rows[0] if rows else mode_rows(analysis, found.first(1), None if errors is None else [0.0])[0]
+        columns = rows[0] if rows else mode_rows(analysis, found.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
-        named = dict.fromkeys(("label", "name"), "rigid body")
-        rows = [{**first, "mode": 1, **named, "stability": "neutral", "share_hub": 1.0}, *rows]
+        rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
     structure = analysis.structure
     summary = {
         **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
@@ -81,7 +84,6 @@ def mode_rows(
             {
                 "mode": i + 1,
                 "label": names[i],
-                "name": engineers_name(names[i]),
                 "frequency": float(lam.imag),
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
                 "damping": float(-lam.real / size) if size > 0.0 else 0.0,

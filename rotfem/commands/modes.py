@@ -14,24 +14,23 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
+from rotfem.accuracy.answer import Setting
+from rotfem.accuracy.errors import Errors, warnings_of
+from rotfem.accuracy.modes import Modes, modal_answers, modal_errors
+from rotfem.analysis.modal import ModalAnalysis, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed, stability_of_pencil
-from rotfem.analysis.theory_error import TheoryError, error_under_load
-from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.advice import advise, frozen_inputs
-from rotfem.commands.error_report import error_of_modes, richer_problem
-from rotfem.commands.mode_tables import mode_tables
+from rotfem.commands.answers import check_of, clock_of, to_accuracy
+from rotfem.commands.mode_tables import doubtful, mode_tables
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, modal_summary
 from rotfem.commands.recorder import check_rows
 from rotfem.errors import ComputationError, SceneError, input_of
-from rotfem.listeners import Hint, silent
+from rotfem.listeners import Compiling, Hint, cpu_time, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.frequencies import FrequencyErrors
-from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.results.result import Result
 from rotfem.scene import Scene, as_scene
@@ -68,8 +67,8 @@ def modes(
     if blade_tables and scene.structure.type == "plate":
         raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
-    def compute(variant: Scene) -> ModesResult:
-        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, hint)
+    def compute(variant: Scene, errors: Errors | None = None, known: Modes | None = None) -> ModesResult:
+        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, hint, errors, known)
         found.blade_tables = blade_tables
         if participation:
             masses, found.summary["mass"] = masses_of(found.analysis, found.spinning)
@@ -77,11 +76,50 @@ def modes(
                 row |= mass
         return found
 
-    return answered(scene, compute, comm, "modes")
+    scene.check_tables("what modes are about" if scene.time is None else "")
+    with input_of(scene.file):
+        if scene.accuracy is None:
+            return compute(scene)
+        problem = Problem.of(scene, terms=terms)
+        return led_to_accuracy(scene, analysis_of(scene, problem, comm, False), speed_of(scene, problem), compute)
+
+
+def speed_of(scene: Scene, problem: ProblemData) -> float:
+    """Return the speed of the modes of a scene, rad/s."""
+    return problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
+
+
+def led_to_accuracy(scene: Scene, analysis: ModalAnalysis, speed: float, compute: Callable[..., R]) -> R:
+    """Return what a command computes of the modes of a scene, with the setting whose modes are within its accuracy.
+
+    Args:
+        scene: with an accuracy.
+        analysis: of its own modes.
+        speed: of the modes that are led to the accuracy, rad/s.
+        compute: variant of the scene, errors of its modes, these modes ↦ result.
+
+    Raises:
+        Missed: there is none; its attribute `result` holds the best.
+        ComputationError: see `modes`.
+    """
+    check_of(scene, ("frequencies",), "modes and campbell")
+    answers, comm = modal_answers(scene, analysis, speed, lambda found: found), analysis.everyone
+
+    def finish(found: Modes, errors: Errors) -> R:
+        setting = Setting(found.analysis.problem.theory.name, *_mesh_of(found.analysis))
+        return compute(answers.variant(setting).replace({"output.error": None}), errors, found)
+
+    return to_accuracy(answers, "frequencies", clock_of(scene, comm), comm, finish)
+
+
+def _mesh_of(analysis: ModalAnalysis) -> tuple[Any, int]:
+    """Return the numbers of elements and the degree of an analysis."""
+    problem = analysis.problem
+    return None if problem.structure.mesh_file else problem.mesh.elements, problem.mesh.degree
 
 
 def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
-    """Return what a command computes of the modes of a scene, to its accuracy if it has one.
+    """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one.
 
     Args:
         scene: as it was given.
@@ -93,40 +131,58 @@ def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, comman
         SceneError: the scene is not valid for the command.
         ComputationError: see `modes`.
     """
-
-    def attempt(setting: Setting) -> R:
-        return compute(scene.replace(changes_of(scene, setting)))
-
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
             return compute(scene)
-        refuse(scene, ("frequencies",), command)
-        return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
+        problem = Problem.of(scene).spinning()
+        top = problem.motion.top_speed(None if scene.time is None else scene.time.end)
+        analysis = analysis_of(scene, problem, comm, False)
+        return led_to_accuracy(scene, analysis, top, lambda variant, errors, found: compute(variant))
 
 
-def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, hint: Hint | None) -> ModesResult:
-    started = perf_counter()
-    analysis = analysis_of(scene, problem, comm)
-    speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
+def _modes(
+    scene: Scene,
+    problem: ProblemData,
+    comm: MPI.Comm,
+    sensitivities: bool,
+    hint: Hint | None,
+    errors: Errors | None = None,
+    known: Modes | None = None,
+) -> ModesResult:
+    started, given, began = perf_counter(), known is not None, cpu_time() - Compiling.seconds
+    analysis = analysis_of(scene, problem, comm) if known is None else known.analysis
+    speed = speed_of(scene, problem)
     hints = hints_of(analysis, scene, hint, speed)
-    found = mode_tables(analysis, speed, scene.modes.count, keep=False, formats=scene.output.fields)
+    modes = None if known is None else known.spinning
+    # matrices last where other modes are computed after these
+    found = mode_tables(analysis, speed, scene.modes.count, formats=scene.output.fields, found=modes)
+    seconds = cpu_time() - Compiling.seconds - began
     check_rows(found.rows)
     spinning = found.spinning
-    stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     warnings = [*frozen_inputs(problem), *analysis.notes, *found.warnings]
     # An instability that grows by more than those of the modes that are asked for is none of them.
-    known = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
-    if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
+    least = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
+    if stability.stable is None or stability.held_by_spin or stability.growth > max(least, 0.0):
         warnings.append(stability.warning())
-    warnings += [off.warning()] if off and off.warning() else []
+    checks = self_checks(analysis, spinning)
+    if scene.output.error and errors is None:
+        errors = modal_errors(scene, analysis, spinning, seconds=seconds)
+    if errors is not None:
+        rigid = len(found.rows) - len(spinning.pairs.values)
+        for row, error in zip(found.rows, [*[0.0] * rigid, *errors.each], strict=False):
+            row["mesh_error"] = error
+        if not given:
+            warnings += warnings_of(errors, Setting.of(scene, moving=False), scene)
+    warnings += doubtful(found.rows)
     found.summary = {
-        **modal_summary("modes", analysis, scene, started, off),
+        **modal_summary("modes", analysis, scene, started),
         "speed": speed,
         "stability": stability.summary(),
-        **({"error": error_of_modes(found.rows, off).summary()} if scene.output.error else {}),
+        **({} if errors is None else {"error": errors.summary(), "settings": errors.rows}),
         **{name: found.summary[name] for name in ("modes", "shapes")},
-        "checks": self_checks(analysis, spinning),
+        "checks": checks,
         "warnings": warnings,
         "advice": hints,
     }
@@ -137,22 +193,7 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     return found
 
 
-def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | None:
-    """Return the error of the frequencies at one speed by the theory; None where it is not known, or not wanted."""
-    richer, motion = richer_problem(analysis.problem), analysis.system.held.motion.at_speed(spinning.speed)
-    if richer is None:
-        return error_under_load(analysis.system.held, motion, spinning.clamped.factor)
-    if not analysis.estimates:
-        return None
-    errors = FrequencyErrors(analysis, richer)
-    differences = [error for error in errors(spinning) if error is not None]
-    if errors.there is None or len(differences) < len(spinning.pairs.values):
-        return None
-    own = error_under_load(errors.there.system.held, motion)
-    return own.of_poorer(analysis.problem.theory, max(differences, default=0.0), {})
-
-
-def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnalysis:
+def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm, counted: bool = True) -> ModalAnalysis:
     """Return the modal analysis that a scene asks for, of a small system each process for itself.
 
     Raises:
@@ -161,7 +202,7 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnal
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
     analysis.everyone = comm
     analysis.estimates = scene.output.error
-    if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
+    if counted and "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis
 

@@ -65,14 +65,6 @@ def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     return [line, *accuracy_report(s)], []
 
 
-def of_response(s: dict[str, Any]) -> tuple[list[str], list[str]]:
-    """Return what `response` prints before and after its table."""
-    off, modes = s["difference"], len(s["modes"])
-    sizes = f"{percent(off['median'])} at half of the frequencies, {percent(off['largest'])} at most"
-    after = f"difference to the response by {modes} modes: {sizes}"
-    return [about(s), f"{s['frequencies']} frequencies of the load"], [after]
-
-
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `explain` prints before and after its tables."""
     absent = ", ".join(f"{name} ({why})" for name, why in s["absent_effects"].items())
@@ -105,7 +97,7 @@ _AROUND = {
     "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
     "modes": lambda s: ([about(s), effects(s), *accuracy_report(s)], []),
     "campbell": of_campbell,
-    "response": of_response,
+    "response": lambda s: ([about(s), f"{s['frequencies']} frequencies of the load"], []),
     "explain": of_explain,
     "compare": lambda s: ([], [f"largest difference: {percent(s['worst'])}"]),
     "sweep": of_sweep,

@@ -23,7 +23,7 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
-from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term
+from rotfem.mechanics.loads import Loads, load_of
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
@@ -31,9 +31,10 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
+from rotfem.scene.loads import Loads as GivenLoads
 from rotfem.scene.settings import estimates_error
 from rotfem.units import si
-from rotfem.users_functions import checked, number_of
+from rotfem.users_functions import number_of
 
 
 class Moment:
@@ -149,7 +150,14 @@ def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
 
 
 class Problem(ProblemData):
-    """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`)."""
+    """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`); `loads` as `rotfem.Loads`."""
+
+    def __post_init__(self) -> None:
+        given: Any = self.loads
+        if isinstance(given, GivenLoads):
+            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
+            object.__setattr__(self, "loads", made)
+        super().__post_init__()
 
     @classmethod
     def of(
@@ -181,7 +189,7 @@ class Problem(ProblemData):
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
-                loads=loads_of(scene, motion).pitched(motion.pitch),
+                loads=Loads.of(scene.loads, scene.structure, motion.angle).pitched(motion.pitch),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,
                 terms=terms or {},
@@ -383,64 +391,3 @@ def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
 
 def _sum(parts: list[Scalar]) -> Scalar:
     return lambda t: sum(part(t) for part in parts)
-
-
-def loads_of(scene: Scene, motion: Motion) -> Loads:
-    """Return the loads of a scene, under a motion that says how its hub turns."""
-    given, structure = scene.loads, scene.structure
-    points = []
-    for i, point in enumerate(given.at):
-        made = {
-            name: load_of(f"loads.at.{i}.{name}", load, structure, motion, point.kind_of(load))
-            for name, load in (("force", point.force), ("moment", point.moment))
-            if load is not None
-        }
-        points.append(PointLoads(point.x, **made))
-    whole: dict[str, Any] = {name: load for name in WHOLE if (load := getattr(given, name)) is not None}
-    made = {name: load_of(f"loads.{name}", load, structure, motion, load.kind) for name, load in whole.items()}
-    return Loads(gravity=given.gravity, at=tuple(points), **made)
-
-
-def load_of(key: str, given: Any, structure: Any, motion: Motion | None = None, kind: str = "dead") -> AnyLoad:
-    """Return one load, or another signal.
-
-    Args:
-        key: of the scene.
-        given: what the scene has there.
-        structure: of the scene.
-        motion: of the hub, for harmonics of its angle.
-        kind: "dead" or "follower".
-    """
-    planar = structure.is_planar
-    size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
-    over, value = given.over
-    if "x" in over and callable(value):
-        timed = "t" in over
-        function = checked(value, key, size, "place and time" if timed else "place", planar)
-        at = function if timed else (lambda x, t: function(x))
-        # Places along the structure, of a plate from a file one, that show how the load changes with time.
-        probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
-        places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
-        return PlaceLoad(kind, at, places, constant=not timed)
-    terms = [_harmonic(harmonic, motion) for harmonic in getattr(given, "harmonic", ())]
-    if callable(value):
-        of_time = checked(value, key, size, "time", planar)
-        each = Shapes.uniform(np.eye(size))
-        terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
-    elif over == ("t",):
-        terms.append(Term.table(value, Shapes.uniform(np.eye(len(value[0]) - 1))))
-    elif over:
-        terms.append(Term(Shapes.along_span(value)) if over == ("x",) else Term.both(value))
-    elif isinstance(value, dict):
-        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in value.items()]
-    elif value is not None:
-        terms.append(Term(Shapes.uniform([value])))
-    return Load(kind, tuple(terms))
-
-
-def _harmonic(harmonic: Any, motion: Any) -> Term:
-    amplitude, per_rev = harmonic.amplitude, harmonic.per_rev
-    shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
-    if per_rev is None:
-        return Term.harmonic(shapes, lambda t: harmonic.frequency * t, harmonic.phase)
-    return Term.harmonic(shapes, lambda t: per_rev * np.array([motion.angle(float(s)) for s in t]), harmonic.phase)

@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.theory_error import TheoryError
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import resolved, structures
@@ -112,9 +111,7 @@ def timings(parts: Mapping[str, float], started: float, before: Mapping[str, flo
     return {**named, "other": total - sum(named.values()), "total": total}
 
 
-def modal_summary(
-    command: str, analysis: ModalAnalysis, scene: Scene, started: float, theory: TheoryError | None
-) -> dict[str, Any]:
+def modal_summary(command: str, analysis: ModalAnalysis, scene: Scene, started: float) -> dict[str, Any]:
     """Return what the summaries of modes and Campbell diagrams have in common, started at a `perf_counter()`."""
     space = analysis.system.V.dofmap
     return {
@@ -125,5 +122,4 @@ def modal_summary(
         "effects": list(analysis.model.effects),
         "dofs": space.index_map.size_global * space.index_map_bs,
         "timings": timings(analysis.seconds, started),
-        **({} if theory is None else {"theory_error": theory.summary()}),
     }

@@ -20,6 +20,7 @@ from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations
 from rotfem.errors import ComputationError, InputError
+from rotfem.listeners import computing
 from rotfem.mechanics.theories import Theory, richest, theories
 from rotfem.results.run import RunResult, StationHistory, Table
 from rotfem.scene.settings import OutputTable
@@ -33,16 +34,20 @@ class Log:
     """What a run counts and has to say.
 
     Attributes:
-        started: `perf_counter()` then, s.
+        started, began: `perf_counter()` then, and CPU time without compilation, s.
         steps: number of the last step.
-        elapsed: time that it had taken before it went on from a checkpoint, s.
+        parts: steps that were taken, parts of steps counted each.
+        elapsed, cpu: time and CPU time that it had taken before it went on from a checkpoint, s.
         warnings, advice: texts.
         resumed: time (s) and number of ranks of every checkpoint that it went on from.
     """
 
     started: float = field(default_factory=perf_counter)
+    began: float = field(default_factory=computing)
     steps: int = 0
+    parts: int = 0
     elapsed: float = 0.0
+    cpu: float = 0.0
     warnings: list[str] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)
     resumed: list[dict[str, Any]] = field(default_factory=list)

@@ -31,8 +31,8 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.advice import frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, theory_error
-from rotfem.commands.problem import Problem, loads_of
+from rotfem.commands.modes import analysis_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.loads import AnyLoad, Loads, PlaceLoad, Term
@@ -64,7 +64,7 @@ def response(
     """Return amplitude and phase of tip, root and stations under the harmonic loads of a scene, over their frequency.
 
     Args:
-        scene: scene, path of a scene file, or nested tables; `modes.count` is that of the response by modes.
+        scene: scene, path of a scene file, or nested tables; of its first `modes.count` modes the peaks are resolved.
         low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; if None 0, or of a free hub, which nothing
             holds, half the first frequency of a mode.
         high: highest frequency; beyond the highest of the modes if None.
@@ -99,8 +99,7 @@ def response(
             infinite = spinning.pairs.values[undamped].imag
             asked, direct = resolved(answers_at, asked, direct, answers.names, number, infinite)
             peaks = ~np.isin(asked, given)
-        modal = answers.modal(asked, scene.modes.count)
-        return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
+        return result_of(scene, answers, (asked, peaks, undamped), direct, started)
 
 
 def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[Output]]:
@@ -220,22 +219,21 @@ def result_of(
     scene: Scene,
     found: FrequencyResponse,
     asked: tuple[Array, Array, list[int]],
-    answers: tuple[Array, Array],
+    direct: Array,
     started: float,
 ) -> ResponseResult:
-    """Return the result of all answers (direct, by modes) at frequencies, those of peaks marked."""
-    (omegas, peaks, undamped), (direct, modal), outputs = asked, answers, found.names
+    """Return the result of the answers at frequencies, those of peaks marked."""
+    (omegas, peaks, undamped), outputs = asked, found.names
     analysis, spinning = found.analysis, found.spinning
-    off, worst = differences(outputs, direct, modal, "tip_"), differences(outputs, direct, modal, "")
     rows = list[dict[str, Any]]()
-    for omega, by_factor, by_modes, o, w, peak in zip(omegas, direct, modal, off, worst, peaks, strict=True):
+    for omega, answers, peak in zip(omegas, direct, peaks, strict=True):
         row: dict[str, Any] = {"frequency": float(omega), "frequency_hz": float(omega / (2 * np.pi))}
         row |= {} if spinning.speed == 0.0 else {"per_rev": float(omega / abs(spinning.speed))}
-        for name, d, m in zip(outputs, by_factor, by_modes, strict=True):
-            row |= {name: float(abs(d)), f"{name}_phase": float(np.angle(d)), f"{name}_modal": float(abs(m))}
-        rows.append(row | {"difference": float(o), "worst_difference": float(w), "peak": int(peak)})
+        for name, answer in zip(outputs, answers, strict=True):
+            row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
+        rows.append(row | {"peak": int(peak)})
     modes = mode_rows(analysis, spinning)
-    stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     warnings = [
         *frozen_in_frame(analysis.problem),
         *analysis.notes,
@@ -244,16 +242,13 @@ def result_of(
         *doubtful(modes),
     ]
     warnings += [stability.warning()] if not stability.stable else []
-    warnings += [theory.warning()] if theory and theory.warning() else []
-    usual = float(np.median(off))
-    warnings += remarks(modes, undamped, usual, scene.modes.count)
-    warnings += [
-        f"accuracy = {value:g} is not pursued: a frequency response is of the scene's own model and mesh"
-        for value in [scene.accuracy]
-        if value is not None
-    ]
+    warnings += [no_damping(modes, undamped)] if undamped else []
+    if scene.accuracy is not None:
+        warnings.append(
+            f"accuracy = {scene.accuracy:g} is not pursued: a frequency response is of the scene's own model and mesh"
+        )
     summary = {
-        **modal_summary("response", analysis, scene, started, theory),
+        **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,
@@ -262,47 +257,21 @@ def result_of(
             name: {"frequency": float(omegas[i]), "amplitude": float(abs(direct[i, j]))}
             for j, (name, i) in enumerate(zip(outputs, np.argmax(np.abs(direct), axis=0), strict=True))
         },
-        "difference": {"median": usual, "largest": float(np.max(off)), "worst": float(np.max(worst))},
         "modes": modes[: scene.modes.count],
         "warnings": list(dict.fromkeys(warnings)),
         "advice": [],
     }
-    return ResponseResult(summary, rows, direct, modal)
+    return ResponseResult(summary, rows, direct)
 
 
-def differences(outputs: Sequence[str], direct: Array, modal: Array, kind: str) -> Array:
-    """Return for every frequency how far the answers by modes are off, of quantities of one unit the worst.
-
-    Args:
-        outputs: names.
-        direct: their amplitudes, (frequencies, outputs).
-        modal: the same by modes.
-        kind: what the names of those begin with that count.
-    """
-    units = units_of(outputs)
-    chosen, out = np.array([name.startswith(kind) for name in outputs]), np.zeros(len(direct))
-    for unit in dict.fromkeys(units[chosen]):
-        those = chosen & (units == unit)
-        size = np.linalg.norm(direct[:, those], axis=1)
-        off = np.linalg.norm((modal - direct)[:, those], axis=1)
-        out = np.maximum(out, np.divide(off, size, out=np.zeros_like(off), where=size > 0.0))
-    return out
-
-
-def remarks(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:
-    """Return warnings of modes without damping, and of a response by too few modes."""
-    out = []
-    if undamped:
-        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped[:3])
-        named += f" and {len(undamped) - 3} more" if len(undamped) > 3 else ""
-        out.append(
-            f"no damping: the response is infinite at {named}; peaks there only show how near a frequency came; "
-            "give [structure.damping]"
-        )
-    if off > 1e-2:  # half of them: the largest is between peaks, where little is left to be relative to
-        why = f"it differs by {100 * off:.2g} % or more at half of the frequencies; use a larger modes.count"
-        out.append(f"{count} modes are too few for the response by modes: {why}")
-    return out
+def no_damping(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int]) -> str:
+    """Return the warning of modes without damping."""
+    named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped[:3])
+    named += f" and {len(undamped) - 3} more" if len(undamped) > 3 else ""
+    return (
+        f"no damping: the response is infinite at {named}; peaks there only show how near a frequency came; "
+        "give [structure.damping]"
+    )
 
 
 def swept_loads(scene: Scene, motion: Motion) -> Loads:
@@ -313,7 +282,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     Raises:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
-    made = loads_of(scene, motion)
+    made = Loads.of(scene.loads, scene.structure, motion.angle)
     changing = {name: load for name, load in made.named.items() if not load.constant}
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "

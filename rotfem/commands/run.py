@@ -16,7 +16,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
-from rotfem.accuracy.outputs import OUTPUTS, of_columns, output_of
+from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
@@ -34,7 +34,7 @@ from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
-from rotfem.listeners import Compiling, Hint, Progress, cpu_time, silent
+from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
 from rotfem.mechanics.problem import Problem as ProblemData
@@ -92,7 +92,6 @@ class Simulation:
         self.last: State | None = None
         self.shape: Array | None = None
         #: Legs of all steps; the output at the rows so far, and states of rows whose other values wait to be asked for.
-        self.steps = 0
         self._output = OUTPUTS[output_of(scene)]
         self._values = list[Array]()
         self._waiting = list[State]()
@@ -106,10 +105,20 @@ class Simulation:
         return Series(history["t"], of_columns(output_of(self.scene), history, self.system.structure))
 
     @property
+    def steps(self) -> int:
+        """Number of steps that were taken, parts of steps counted each."""
+        return self.log.parts
+
+    @property
     def stable(self) -> bool | None:
         """Whether the equilibrium is stable; None of a history."""
         known = self.monitor.stability if self.scene.time is None else None
         return None if known is None else known.stable
+
+    @property
+    def lines(self) -> list[Array]:
+        """Coordinates (m) of the vertices of the mesh along each axis."""
+        return lines(self.system)
 
     @property
     def round_off(self) -> None:
@@ -216,7 +225,7 @@ class Simulation:
     # --- what sees them ---------------------------------------------------------------------------------------------
 
     def _leg(self, old: State, new: State, leg: Any) -> None:
-        self.steps += 1
+        self.log.parts += 1
 
     def _sampled(self, state: State) -> None:
         """Take the output of a row; the rest of it waits."""
@@ -301,7 +310,6 @@ class Simulation:
             "theory": self.problem.theory.name,
             "frame": self.problem.frame,
             "effects": list(system.model.effects),
-            "integrals": system.integrals,
             "dofs": space.index_map.size_global * space.index_map_bs,
             "elements": mesh.topology.index_map(mesh.topology.dim).size_global,
             "steps": log.steps,
@@ -416,15 +424,14 @@ def simulate(
             answers.times = rows_of(scene)
             done: RunResult = to_accuracy(answers, output_of(scene), clock, comm, lambda result, errors: result)
             return done
-        began = cpu_time() - Compiling.seconds
         simulation = Simulation(scene, Problem.of(scene, terms=terms, outputs=outputs), store)
         also, critical = hints_of_start(scene, simulation.problem), simulation.monitor.critical
         simulation.log.advice = advise(scene, hint, critical=critical, also=also)
         result = simulation.run(progress)
         if not scene.output.error:
             return result
-        degree = simulation.system.V.element.basix_element.degree  # a default differs by cell
-        own = Answer(replace(Setting.of(scene), degree=degree), simulation, cpu_time() - Compiling.seconds - began)
+        degree, log = simulation.system.V.element.basix_element.degree, simulation.log  # a default differs by cell
+        own = Answer(replace(Setting.of(scene), degree=degree), simulation, log.cpu + computing() - log.began)
         answers.keep(own)
         shown(result)
         started = perf_counter()

@@ -25,6 +25,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import SceneError, Stopped
+from rotfem.listeners import computing
 from rotfem.results.checkpoint_file import checkpoint_of, read_checkpoint, write_checkpoint
 from rotfem.results.result_set import CHECKPOINT, LiveTable, ResultFolder
 from rotfem.scene import Scene, Time
@@ -37,7 +38,7 @@ SELDOM = 50
 
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
-    "log": ("steps", "warnings", "resumed"),
+    "log": ("steps", "parts", "warnings", "resumed"),
     "monitor": ("since", "stability"),
     "monitor.farthest": ("seen",),
     "record.snapshots": ("kept", "_every", "_count"),
@@ -66,12 +67,7 @@ class Memory:
         return {name: part for name, part in found.items() if part is not None}
 
     def taken(self, state: State, identity: Tree) -> Tree:
-        """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0.
-
-        Args:
-            state: at the end of the last step.
-            identity: of the run.
-        """
+        """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
         own = {
             "positions": self.system.V.tabulate_dof_coordinates(),
             "state": state.changed(inner=()),
@@ -84,16 +80,13 @@ class Memory:
             "versions": versions(),
             "t": state.t,
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
+            "cpu": self.log.cpu + computing() - self.log.began,
             "rows": np.array(self.record.history.rows()).reshape(len(self.record.history), -1),
             "processes": self.system.comm.gather(own),
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:
-        """Make the run know what a checkpoint says; return the state to go on from.
-
-        Raises:
-            SceneError: the mesh is another one, or other processes share it.
-        """
+        """Make the run know what a checkpoint says; return the state to go on from."""
         comm, here, ranks = self.system.comm, self.system.V.tabulate_dof_coordinates(), len(tree["processes"])
         if ranks != comm.size:
             why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
@@ -107,7 +100,7 @@ class Memory:
             vars(part).update(own["parts"][name])
         for row in tree["rows"]:
             self.record.history.append(row)
-        self.log.elapsed = tree["elapsed"]
+        self.log.elapsed, self.log.cpu = tree["elapsed"], tree["cpu"]
         state: State = own["state"]
         self.log.resumed.append({"time": state.t, "ranks": comm.size})
         self.system.count_rotations_from(state.reference)
@@ -124,7 +117,7 @@ def identity_of(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, An
     content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
     tables: Tree = json.loads(json.dumps(scene.digest(), default=str))
     tables.get("time", {}).pop("end", None)
-    tables = {key: value for key, value in tables.items() if key not in ("name", "limits")}
+    tables.pop("name", None)
     return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
 
 
@@ -140,11 +133,7 @@ def differences(there: Any, here: Any, key: str = "") -> list[str]:
 
 
 def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
-    """Refuse a checkpoint of another run, or one that lies after an end (s).
-
-    Raises:
-        SceneError: it is of another scene, or of another version of the program; says what differs.
-    """
+    """Refuse a checkpoint of another run, or one that lies after an end (s)."""
     why, (there, here) = "", (tree["versions"]["rotfem"], versions()["rotfem"])
     if there != here:
         why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
@@ -204,16 +193,7 @@ class RunStore:
         return self._tree is not None
 
     def open(self, scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> None:
-        """Read the checkpoint that the run is to go on from, and see that it is one of this run.
-
-        Args:
-            scene: what is run.
-            terms: terms that a script adds.
-            outputs: outputs that it asks for.
-
-        Raises:
-            SceneError: there is none, or it is damaged, or of another run; or there is nothing to go on with.
-        """
+        """Read the checkpoint to go on from, if one is; refuse that of another run, and runs that have none."""
         if self.every is None and not self.resume:
             return
         option = "--resume" if self.resume else "--checkpoint"
@@ -240,12 +220,7 @@ class RunStore:
         return self._interrupts
 
     def start(self, run: Memory) -> State | None:
-        """Begin the results of a run; return the state that it goes on from, if it does.
-
-        Raises:
-            OutputError: the folder cannot be written.
-            SceneError: the checkpoint does not fit.
-        """
+        """Begin the results of a run; return the state of the checkpoint that it goes on from, None without."""
         self._run = run
         folder, tree, state = self.folder, self._tree, None
         if folder is None:
@@ -260,12 +235,7 @@ class RunStore:
         return state
 
     def stepped(self, state: State) -> None:
-        """Take note of the end of a step.
-
-        Raises:
-            Stopped: a signal has asked one of the ranks to end.
-            OutputError: a checkpoint cannot be written.
-        """
+        """Take note of the end of a step; raise `Stopped` where a signal has asked one of the ranks to end."""
         assert self._run is not None
         if self._live is not None:
             self._live.update()

@@ -86,12 +86,6 @@ class AffineSystem(System):
             )
             raise InputError("terms" if name in problem.terms else "model.effects", name, why)
 
-    @property
-    def integrals(self) -> dict[str, int]:
-        """Number of integrals in F, and in the pieces' forms."""
-        count = sum(len(form.integrals()) for kind, form in self._decomposed.at_rest.items() if kind != "f")
-        return {"F": forms.integral_count(self.model.residual), "J": count}
-
     def leave_out(self, effects: Collection[str]) -> None:
         """Leave out the pieces of some effects, or the PRESTRESS, and include all others."""
         super().leave_out(effects)

@@ -56,7 +56,7 @@ class HubRow:
             "outside": added(outside) if outside else None,
         }
         there = {name: form for name, form in wanted.items() if form is not None}
-        self._forms = dict(zip(there, forms.together(list(there.values()), once), strict=True))
+        self._forms = {name: forms.form(f, once) for name, f in there.items()}
         self._vector = compat.create_vector(system.V)
 
     @cached_property

@@ -29,10 +29,10 @@ from rotfem.structures import build
 from rotfem.structures.structure import Structure
 from rotfem.users_functions import called
 
-#: Name ↦ UFL form (or what stands for it, see `rotfem.numerics.forms.drawn`), and name ↦ compiled form.
+#: Name ↦ constants of each integral of a form, and name ↦ compiled form.
 Both = tuple[dict[str, Any], dict[str, Any]]
 
-#: Purpose and signature of a residual ↦ sketches of the forms that follow from it; the latest ones.
+#: Purpose and signature of a residual ↦ the forms that follow from it without their mesh; the latest ones.
 _KNOWN: dict[tuple[str, str], dict[str, Any]] = {}
 
 
@@ -186,7 +186,7 @@ class Model:
                 out[name] = self._switched(name, name in self.effects, term)
         return out
 
-    def derived_forms(self, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
+    def derived_forms(self, purpose: str, make: Callable[[], dict[str, Any]], more: tuple[Any, ...] = ()) -> Both:
         """Return derived forms of the residual; they are kept by its signature, and reused on other meshes."""
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
@@ -194,15 +194,16 @@ class Model:
         key, whole = (purpose, residual.signature()), (functions, constants)
         if key in _KNOWN:
             (data,) = residual.subdomain_data().values()
-            both = {name: forms.drawn(known, whole, self.structure.V, data) for name, known in _KNOWN[key].items()}
-            return {name: f for name, (f, _) in both.items()}, {name: compiled for name, (_, compiled) in both.items()}
-        derived, compiled = make()
-        sketches = {name: forms.sketch(f, compiled[name], whole) for name, f in derived.items()}
-        if None not in sketches.values():
-            _KNOWN[key] = sketches
+            both = {name: known.on(self.structure.V, whole, data) for name, known in _KNOWN[key].items()}
+            return {name: parts for name, (parts, _) in both.items()}, {name: form for name, (_, form) in both.items()}
+        derived = make()
+        compiled = {name: forms.form(f, once=True) for name, f in derived.items()}
+        known = {name: forms.mesh_free(f, compiled[name], whole) for name, f in derived.items()}
+        if None not in known.values():
+            _KNOWN[key] = known
             if len(_KNOWN) > 32:
                 del _KNOWN[next(iter(_KNOWN))]
-        return derived, compiled
+        return {name: forms.constants_of(f) for name, f in derived.items()}, compiled
 
     def by_strains(self) -> list[Any]:
         """Return the residual in two parts, the first with all terms that have strains; UFL forms."""

@@ -15,7 +15,6 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
-from rotfem.equations.model import Both
 from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
@@ -126,7 +125,8 @@ class NonlinearSystem(System):
             libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
             if self.model.hub is not None and self._by_spin.ufl is not None:
                 libraries[-1].append(self._by_spin.ufl)
-            compiled = [forms.together(library, once=self.parted and self.structure.planar) for library in libraries]
+            once = self.parted and self.structure.planar
+            compiled = [[forms.form(f, once) for f in library] for library in libraries]
             self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
             self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]
@@ -171,19 +171,13 @@ class NonlinearSystem(System):
     def _at_rest(self) -> dict[str, Any]:
         return self.model.at_rest(self._residual_form)
 
-    def _made(self) -> Both:
-        derived = {name: form for name, form in self._at_rest.items() if not form.empty()}
-        return derived, {name: forms.form(form, once=True) for name, form in derived.items()}
+    def _made(self) -> dict[str, Any]:
+        return {name: form for name, form in self._at_rest.items() if not form.empty()}
 
     @cached_property
     def _parts(self) -> dict[str, Any]:
         """F, K, C and M at v = a = 0, compiled, without those that vanish."""
         return self.model.derived_forms("at rest", self._made)[1]
-
-    @property
-    def integrals(self) -> dict[str, int]:
-        """Number of integrals in F and J."""
-        return {"F": forms.integral_count(self._residual_form), "J": forms.integral_count(self._tangent_form)}
 
     def residual(self) -> Any:
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""

@@ -51,10 +51,10 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
     return 0 if isinstance(out, int) or expand_derivatives(out).empty() else out
 
 
-def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Piece, Any, frozenset[str]]]:
+def geometric_pieces(pieces: Pieces, parts: list[Any], compiled: Any) -> list[tuple[Piece, Any, frozenset[str]]]:
     """Return (load piece, its nonzero geometric stiffness, the effect that adds it or none) of all."""
     switches = pieces.model.switches
-    there = set(form.constants())
+    there = {constant for part in parts for constant in part}
     adding = [name for name, switch in switches.items() if switch in there]
     loads, displaced = _stressing(pieces, compiled), list[tuple[Any, list[Array]]]()
 
@@ -168,8 +168,7 @@ class Pieces:
         apart: whether effects have pieces of their own; else terms of the same constants are one piece.
 
     Attributes:
-        at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0, or what stands for it (`rotfem.numerics.forms.drawn`);
-            those that vanish are left out.
+        at_rest: "f", "K", "C", "M" ↦ constants of each integral of the form at q = v = a = 0, where there is one.
         constants: name ↦ constant of frame and loads.
         axis: components of the spin axis that w and dw have.
         assembler: makes matrices of the pattern of all.
@@ -217,18 +216,17 @@ class Pieces:
             self.__dict__.pop("material_solver", None)
             self.assembler.release()
 
-    def _made(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return f, K, C and M at q = v = a = 0, as UFL and compiled forms; those that vanish are left out."""
+    def _made(self) -> dict[str, Any]:
+        """Return f, K, C and M at q = v = a = 0, UFL forms; those that vanish are left out."""
         at_rest = self.model.at_rest(self.model.residual, undeformed=True)
-        at_rest = {kind: form for kind, form in at_rest.items() if not form.empty()}
-        return at_rest, dict(zip(at_rest, forms.together(list(at_rest.values()), once=True), strict=True))
+        return {kind: form for kind, form in at_rest.items() if not form.empty()}
 
-    def _made_geometric(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _made_geometric(self) -> dict[str, Any]:
         """Return the geometric stiffness likewise, if there is one."""
         u, w, theory, form = ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.model.theory, 0
         if theory.prestress:
             form = geometric_stiffness(self.model, (self.q, self.prestress_displacement), u, w, theory)
-        return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
+        return {} if isinstance(form, int) else {"G": form}
 
     def _narrow(self) -> None:
         """Remove zero entries from the pattern, found at random constants and a random state."""
@@ -291,8 +289,7 @@ class Pieces:
     def _parts(self, kind: str) -> list[tuple[str, tuple[str, ...]]]:
         """Return the terms in one of the forms, each with the switches of the bodies it acts on there, none first."""
         switches, found = self.model.switches, dict[str, set[str]]()
-        for integral in self.at_rest[kind].integrals():
-            there = set(extract_constants(integral.integrand()))
+        for there in self.at_rest[kind]:
             names = [name for name, switch in switches.items() if switch in there]
             term = next(name for name in names if name in self.model.terms)
             found.setdefault(term, set()).update([name for name in names if name != term] or [""])
@@ -422,12 +419,12 @@ class Pieces:
         """The displacement of the linear structure that carries N⁰."""
         return fem.Function(self.V)
 
-    def _prestress(self, form: Any, compiled: Any) -> None:
+    def _prestress(self, parts: list[Any], compiled: Any) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
         started = perf_counter()
         if not self._apart and self.stiffness.getSize()[0] > SMALL:
             combine(self.stiffness, [self.material], np.ones(1))
             self.analysed = DirectSolver(self.stiffness, symmetric=True)
-        for load, K, added in geometric_pieces(self, form, compiled):
+        for load, K, added in geometric_pieces(self, parts, compiled):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
         self.assembled += perf_counter() - started

@@ -182,11 +182,6 @@ class System(Solutions, ABC):
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state: the speed along the axis varies; a PETSc vector."""
 
     @property
-    @abstractmethod
-    def integrals(self) -> dict[str, int]:
-        """Number of integrals in F and J."""
-
-    @property
     def current(self) -> bool:
         """Whether M, C and K of the last tangent are those of this time; known of linear theories alone."""
         return False

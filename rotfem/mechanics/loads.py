@@ -8,7 +8,7 @@ place and time is evaluated at the nodes of the mesh (`PlaceLoad`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from rotfem.mechanics.pitch import Pitch
 from rotfem.short import short_fields
-from rotfem.units import si
+from rotfem.users_functions import checked
 
 Array = npt.NDArray[np.float64]
 
@@ -151,6 +151,11 @@ class Load:
     seen: Callable[[float], Array] | None = None
     unpitched: Load | None = None
 
+    @classmethod
+    def of_components(cls, components: Sequence[float], kind: str = "dead") -> Load:
+        """Return a constant, uniform load of these components, N, N/m, N/m² or N·m."""
+        return cls(kind, (Term(Shapes.uniform([components])),))
+
     @cached_property
     def is_uniform(self) -> bool:
         """Whether it is uniform; its amplitudes are then its components."""
@@ -204,19 +209,6 @@ class Load:
         return np.sum(parts, axis=0) if len(parts) == len(self.terms) else None
 
 
-class ConstantLoad(Load):
-    """A constant, uniform load.
-
-    Args:
-        value: components, N, N/m, N/m² or N·m, or as "2 kN".
-        kind: see `Load`.
-    """
-
-    def __init__(self, value: Sequence[float | str], kind: str = "dead"):
-        units = ("N", "N/m", "N/m**2", "N*m")
-        super().__init__(kind, (Term(Shapes.uniform([tuple(si(x, units, "value") for x in value)])),))
-
-
 @dataclass(frozen=True)
 class PlaceLoad:
     """A load that is a function of place and time, with the interface of `Load`.
@@ -261,57 +253,31 @@ AnyLoad: TypeAlias = Load | PlaceLoad
 
 
 @dataclass(frozen=True)
-class PointLoads:
-    """Force and moment at one place of the structure.
-
-    Attributes:
-        x: along a beam (m), or (x, y) on a plate.
-        force: N, or None.
-        moment: N·m, or None.
-    """
-
-    x: tuple[float, ...]
-    force: AnyLoad | None = None
-    moment: AnyLoad | None = None
-
-
-#: Loads of the whole structure and of its tip.
-WHOLE = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
-
-
-@dataclass(frozen=True)
 class Loads:
-    """Gravity and the loads on a structure; none by default.
+    """Gravity and the loads on a structure as sums of terms; none by default.
 
     Attributes:
         gravity: acceleration, m/s², inertial axes.
-        tip_force: N.
-        tip_moment: N·m.
-        distributed: force per length of a beam, N/m, or per area of a plate, N/m².
-        distributed_moment: moment per length of a beam, N.
-        pressure: force per area along the normal of a plate, N/m²: one component.
-        at: forces and moments at places of the structure.
+        named: name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment".
+        places: of the loads "at.0", "at.1", …: (x,) along a beam (m), or (x, y) on a plate.
     """
 
     gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    tip_force: AnyLoad | None = None
-    tip_moment: AnyLoad | None = None
-    distributed: AnyLoad | None = None
-    distributed_moment: AnyLoad | None = None
-    pressure: AnyLoad | None = None
-    at: tuple[PointLoads, ...] = ()
+    named: Mapping[str, AnyLoad] = field(default_factory=dict)
+    places: tuple[tuple[float, ...], ...] = ()
     __repr__ = short_fields
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gravity", tuple(si(g, "m/s**2", "loads.gravity") for g in self.gravity))
+    @classmethod
+    def of(cls, given: Any, structure: Any, angle: Callable[[float], float]) -> Loads:
+        """Return the loads that a scene or a script gives, as sums.
 
-    @property
-    def named(self) -> dict[str, AnyLoad]:
-        """Name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment"."""
-        out = {name: getattr(self, name) for name in WHOLE}
-        for i, point in enumerate(self.at):
-            out |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
-        return {name: load for name, load in out.items() if load is not None}
+        Args:
+            given: table [loads], `rotfem.Loads`.
+            structure: of the scene, which they work on.
+            angle: time (s) ↦ angle of the hub (rad), for harmonics of it.
+        """
+        named = {name: load_of(f"loads.{name}", load, structure, angle, kind) for name, load, kind in given.named()}
+        return cls(given.gravity, named, tuple(point.x for point in given.at))
 
     @property
     def stations(self) -> set[float]:
@@ -321,16 +287,11 @@ class Loads:
     @property
     def jumps(self) -> set[float]:
         """Places along the structure (m) of jumps and point loads."""
-        return {x for load in self.named.values() for x in load.jumps} | {p.x[0] for p in self.at if len(p.x) == 1}
+        return {x for load in self.named.values() for x in load.jumps} | {p[0] for p in self.places if len(p) == 1}
 
     def replaced(self, changed: Mapping[str, AnyLoad]) -> Loads:
-        """Return the loads with some of them replaced, by name (see `named`)."""
-        points = tuple(
-            replace(p, **{part: changed.get(f"at.{i}.{part}", getattr(p, part)) for part in ("force", "moment")})
-            for i, p in enumerate(self.at)
-        )
-        whole: dict[str, Any] = {name: load for name, load in changed.items() if name in WHOLE}
-        return replace(self, at=points, **whole)
+        """Return the loads with some of them replaced, by name."""
+        return replace(self, named={**self.named, **changed})
 
     def pitched(self, pitch: Pitch | None) -> Loads:
         """Return the loads in the frame of a blade that pitches; the same without a pitch over time.
@@ -347,6 +308,53 @@ class Loads:
             return self
         dead = {name: load for name, load in self.named.items() if load.kind == "dead" and not load.is_zero}
         return self.replaced({name: _in_blade(load, pitch) for name, load in dead.items()})
+
+
+def load_of(
+    key: str, given: Any, structure: Any, angle: Callable[[float], float] | None = None, kind: str = "dead"
+) -> AnyLoad:
+    """Return one load, or another signal.
+
+    Args:
+        key: of the scene.
+        given: what the scene has there.
+        structure: of the scene.
+        angle: time (s) ↦ angle of the hub (rad), for harmonics of it.
+        kind: "dead" or "follower".
+    """
+    planar = structure.is_planar
+    size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
+    over, value = given.over
+    if "x" in over and callable(value):
+        timed = "t" in over
+        function = checked(value, key, size, "place and time" if timed else "place", planar)
+        at = function if timed else (lambda x, t: function(x))
+        # Places along the structure, of a plate from a file one, that show how the load changes with time.
+        probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
+        places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
+        return PlaceLoad(kind, at, places, constant=not timed)
+    terms = [_harmonic(harmonic, angle) for harmonic in getattr(given, "harmonic", ())]
+    if callable(value):
+        of_time = checked(value, key, size, "time", planar)
+        each = Shapes.uniform(np.eye(size))
+        terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
+    elif over == ("t",):
+        terms.append(Term.table(value, Shapes.uniform(np.eye(len(value[0]) - 1))))
+    elif over:
+        terms.append(Term(Shapes.along_span(value)) if over == ("x",) else Term.both(value))
+    elif isinstance(value, dict):
+        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in value.items()]
+    elif value is not None:
+        terms.append(Term(Shapes.uniform([value])))
+    return Load(kind, tuple(terms))
+
+
+def _harmonic(harmonic: Any, angle: Any) -> Term:
+    amplitude, per_rev, omega = harmonic.amplitude, harmonic.per_rev, harmonic.frequency
+    shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
+    if omega is not None:
+        return Term.harmonic(shapes, lambda t: omega * t, harmonic.phase)
+    return Term.harmonic(shapes, lambda t: per_rev * np.array([angle(float(s)) for s in t]), harmonic.phase)
 
 
 def is_moment(name: str) -> bool:

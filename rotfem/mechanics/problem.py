@@ -52,7 +52,7 @@ class Problem:
         mesh: elements, degree and integration.
         theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
-        loads: gravity and applied loads.
+        loads: gravity and applied loads, as sums.
         frame: "rotating", or "inertial" (translates with the hub, does not rotate).
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
         outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.

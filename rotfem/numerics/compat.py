@@ -28,21 +28,37 @@ def wrap(x: la.Vector) -> Any:
     return dolfinx.la.petsc.create_vector_wrap(x)
 
 
-def _gmshio() -> Any:
+def form_of(code: Any, module: Any, spaces: list[Any], functions: list[Any], constants: list[Any], data: Any) -> Any:
+    """Return a form of code that FFCx has compiled, on the mesh of its spaces (0.9 wants a pointer, 0.11 a list).
+
+    Args:
+        code: FFCx's form.
+        module: where it is.
+        spaces: of its arguments.
+        functions: its coefficients, in the order of the code.
+        constants: its constants likewise.
+        data: UFL's type of an integral ↦ list of its subdomain data.
+    """
+    regions = {}
+    for kind in (getattr(fem.IntegralType, name) for name in data):
+        begin, end = (code.form_integral_offsets[kind.value + i] for i in (0, 1))
+        ids = {code.form_integral_ids[i] for i in range(begin, end)} - {-1}  # -1 is everywhere
+        regions[kind] = fem.forms.get_integration_domains(kind, data[kind.name][0], sorted(ids))
+    objects = [[x._cpp_object for x in each] for each in (spaces, functions, constants)]
+    make, mesh = fem.forms.form_cpp_class(PETSc.ScalarType), spaces[0].mesh.ufl_domain().ufl_cargo()
+    pointer = int(module.ffi.cast("uintptr_t", module.ffi.addressof(code)))
     try:
-        from dolfinx.io import gmsh as gmshio
-    except ImportError:
-        from dolfinx.io import gmshio
-    return gmshio
-
-
-def extract(model: Any) -> None:
-    """Do once what `model_to_mesh` does on rank 0 alone, to see it fail there where no other rank waits for it."""
-    _gmshio().extract_geometry(model)
-    _gmshio().extract_topology_and_markers(model)
+        made = make([pointer], *objects, regions, [], mesh)
+    except TypeError:
+        made = make(pointer, *objects, regions, {}, mesh)
+    return fem.Form(made, code, None, module)
 
 
 def model_to_mesh(model: Any, comm: Any) -> tuple[Any, Any, Any]:
     """Return (mesh in the plane, cell tags, edge tags) of a gmsh model that rank 0 holds."""
-    out = _gmshio().model_to_mesh(model, comm, 0, gdim=2)
+    try:
+        from dolfinx.io import gmsh as gmshio
+    except ImportError:
+        from dolfinx.io import gmshio
+    out = gmshio.model_to_mesh(model, comm, 0, gdim=2)
     return (out.mesh, out.cell_tags, out.facet_tags) if hasattr(out, "mesh") else out[:3]

@@ -1,22 +1,17 @@
-"""Forms, compiled and assembled.
-
-A kill in the middle, two programs at once, or a damaged cache do no harm.
-"""
+"""Forms, compiled and assembled."""
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import basix
-import ffcx.codegeneration.jit as ffcx_jit
 import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import cpp, fem, la
-from dolfinx import jit as dolfinx_jit
+from mpi4py import MPI
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.analysis import extract_constants
@@ -26,11 +21,7 @@ from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
 from rotfem.listeners import Compiling, cpu_time
-from rotfem.numerics import form_cache, traversal
-
-traversal.install()
-#: UFL's module, which its function of the same name hides.
-form_data: Any = importlib.import_module("ufl.algorithms.compute_form_data")
+from rotfem.numerics import compat, form_cache
 
 SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
@@ -174,91 +165,70 @@ def form(f: Any, once: bool = False) -> Any:
     Raises:
         RuntimeError: the compiler failed.
     """
-    return together([f], once)[0]
+    mesh = f.ufl_domains()[0].ufl_cargo()
+    return _compiled(fem.form, f, comm=mesh.comm, flag=(SELDOM if once else OFTEN)[mesh.topology.dim])
 
 
-def together(several: Sequence[Any], once: bool = False) -> list[Any]:
-    """Return UFL forms compiled as one library, which the compiler is started once for.
-
-    Args:
-        several: the forms, none of them empty, of one mesh.
-        once: see `form`.
-
-    Raises:
-        RuntimeError: the compiler failed.
-    """
-    domain = several[0].ufl_domains()[0].ufl_cargo()
-    flags = [(SELDOM if once else OFTEN)[domain.topology.dim], *FLAGS]
-    objects, module = _compiled(ffcx_jit.compile_forms, list(several), domain.comm, flags)
-    return [_given(compiled, module, fem.form, f) for f, compiled in zip(several, objects, strict=True)]
+def _compiled(make: Callable[..., Any], *arguments: Any, comm: MPI.Comm, flag: str) -> Any:
+    """Return what dolfinx makes of a form or an expression; rank 0 says where its code is kept."""
+    began, folder = cpu_time(), comm.bcast(form_cache.folder() if comm.rank == 0 else None)
+    options = {"form_compiler_options": dict(form_cache.FORM_OPTIONS)}
+    with form_cache.in_use(folder):
+        out = make(*arguments, **options, jit_options=form_cache.jit_options(folder, [flag, *FLAGS]))
+    Compiling.seconds += cpu_time() - began
+    return out
 
 
-def _given(compiled: Any, module: Any, make: Callable[..., Any], *arguments: Any) -> Any:
-    """Return what dolfinx makes of a form or expression with this code, which it would compile by itself."""
-    real = dolfinx_jit.ffcx_jit
-    dolfinx_jit.ffcx_jit = lambda *_, **__: (compiled, module, (None, None))
-    try:
-        return make(*arguments)
-    finally:
-        dolfinx_jit.ffcx_jit = real
-
-
-class Sketch(NamedTuple):
-    """A compiled form without its mesh, to be used again on another one.
+class MeshFree(NamedTuple):
+    """A compiled form without its mesh, for further meshes.
 
     Attributes:
-        code: FFCx's form and its module.
-        integrals: type, subdomain, and places of the coefficients and of the constants in those of a whole, of each.
+        code: FFCx's form, and its module.
+        coefficients, constants: their places among those of a whole.
+        parts: places of the constants of each integral.
         rank: number of arguments.
     """
 
     code: tuple[Any, Any]
-    integrals: tuple[tuple[str, Any, list[int], list[int]], ...]
+    coefficients: list[int]
+    constants: list[int]
+    parts: list[list[int]]
     rank: int
 
+    def on(self, V: fem.FunctionSpace, whole: tuple[Sequence[Any], Sequence[Any]], regions: Any) -> tuple[Any, Any]:
+        """Return (constants of each integral, compiled form) on the mesh of a space of the arguments.
 
-def sketch(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]]) -> Sketch | None:
-    """Return what is to be known of a UFL form; None where it has more than the whole.
+        Args:
+            V: the space.
+            whole: coefficients and constants there, in the order of `mesh_free`.
+            regions: type of integral ↦ its subdomain data.
+        """
+        coefficients = [whole[0][i] for i in self.coefficients]
+        constants = [whole[1][i] for i in self.constants]
+        made = compat.form_of(*self.code, [V] * self.rank, coefficients, constants, regions)
+        return [[whole[1][i] for i in part] for part in self.parts], made
+
+
+def mesh_free(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]]) -> MeshFree | None:
+    """Return a UFL form and what `form` makes of it without its mesh; None where it has more than a whole.
 
     Args:
         f: the form.
-        compiled: what `form` makes of it.
+        compiled: it compiled.
         whole: coefficients and constants of a form that another one with its signature has at the same places.
     """
-    integrals = []
-    for part in f.integrals():
-        own = extract_coefficients(part.integrand()), extract_constants(part.integrand())
-        if any(x not in all_of for mine, all_of in zip(own, whole, strict=True) for x in mine):
-            return None
-        places = [[all_of.index(x) for x in mine] for mine, all_of in zip(own, whole, strict=True)]
-        integrals.append((part.integral_type(), part.subdomain_id(), *places))
-    return Sketch((compiled.ufcx_form, compiled.module), tuple(integrals), len(f.arguments()))
+    code, functions, (coefficients, constants) = compiled.ufcx_form, f.coefficients(), whole
+    used = [functions[code.original_coefficient_positions[i]] for i in range(code.num_coefficients)]
+    if any(x not in coefficients for x in used) or any(x not in constants for x in f.constants()):
+        return None
+    places, parts = {c: i for i, c in enumerate(constants)}, constants_of(f)
+    own = [places[c] for c in f.constants()], [[places[c] for c in part] for part in parts]
+    return MeshFree((code, compiled.module), [coefficients.index(x) for x in used], *own, len(f.arguments()))
 
 
-def drawn(known: Sketch, whole: tuple[Sequence[Any], Sequence[Any]], V: Any, data: Any) -> tuple[Any, Any]:
-    """Return (a UFL form with the integrals, coefficients and constants of a sketch, but not its terms; it compiled).
-
-    Args:
-        known: the sketch.
-        whole: see `sketch`.
-        V: space of the arguments.
-        data: type of an integral ↦ its subdomain data.
-    """
-    arguments = [ufl.TestFunction(V), ufl.TrialFunction(V)][: known.rank]
-    parts, domain = [], V.mesh.ufl_domain()
-    for kind, subdomain, *places in known.integrals:
-        factors = [x for own, all_of in zip(places, whole, strict=True) for x in (all_of[i] for i in own)]
-        term = sum((_first(x) for x in factors), start=ufl.as_ufl(1.0))
-        for x in arguments:
-            term = term * _first(x)
-        parts.append(ufl.Integral(term, kind, domain, subdomain, {}, data[kind][0]))
-    f = ufl.Form(parts)
-    return f, _given(*known.code, fem.form, f)
-
-
-def _first(x: Any) -> Any:
-    """Return the first component of what may be a number, a vector or a matrix."""
-    return x[(0,) * len(x.ufl_shape)] if x.ufl_shape else x
+def constants_of(f: Any) -> list[list[Any]]:
+    """Return the constants of each integral of a UFL form."""
+    return [extract_constants(part.integrand()) for part in f.integrals()]
 
 
 def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:
@@ -278,8 +248,7 @@ def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
     Raises:
         RuntimeError: the compiler failed.
     """
-    (compiled,), module = _compiled(ffcx_jit.compile_expressions, [(e, points)], comm, ["-O2", *FLAGS])
-    return _given(compiled, module, fem.Expression, e, points, comm)
+    return _compiled(fem.Expression, e, points, comm, comm=comm, flag="-O2")
 
 
 def without(f: Any, *functions: Any) -> Any:
@@ -348,45 +317,6 @@ class _Branches(MultiFunction):  # type: ignore[misc]
 def quadrature_points(domain: Any, number: int) -> Any:
     """Return the points of the Gauss rule that has `number` of them in each direction, reference cell coordinates."""
     return basix.make_quadrature(domain.basix_cell(), 2 * number - 1)[0]
-
-
-def integral_count(f: Any) -> int:
-    """Return the number of integrals of a UFL form after differentiation, which is done once for any form."""
-    return _noted_count(f, lambda: expand_derivatives(f))
-
-
-def _noted_count(f: Any, expanded: Callable[[], Any]) -> int:
-    """Return the number of integrals that a form has when it is expanded."""
-    return form_cache.noted(f.signature(), lambda: 0 if (e := expanded()).empty() else len(e.integrals()))
-
-
-def _preprocess_form(f: Any, complex_mode: bool) -> Any:
-    """Return a form as UFL's function of this name, differentiated, on the way to its code; count its integrals."""
-    out = _preprocessed(f, complex_mode)
-    _noted_count(f, lambda: out)
-    return out
-
-
-_preprocessed = form_data.preprocess_form
-form_data.preprocess_form = _preprocess_form
-
-
-def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str]) -> tuple[list[Any], Any]:
-    """Return (compiled objects, module): rank 0 finds or makes the library, all ranks load that one."""
-    library, failure, began = None, None, cpu_time()
-    if comm.rank == 0:
-        try:
-            library = form_cache.library(
-                lambda folder: compile_all(list(objects), cache_dir=folder, cffi_extra_compile_args=flags)
-            )
-        except Exception as error:
-            failure = error
-    library, why = comm.bcast((library, repr(failure)))
-    Compiling.seconds += cpu_time() - began
-    if library is None:
-        raise failure or RuntimeError(f"rank 0 could not compile a form: {why}")
-    out: tuple[list[Any], Any] = library.load()
-    return out
 
 
 def added(parts: Iterable[Any]) -> Any:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
 from rotfem.results.files import json_text
-from rotfem.results.result import Array, Rows
+from rotfem.results.result import Array, OfTable, Rows
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,6 @@ class CriticalSpeed:
         per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
         frequency: of the branch there, in the rotating frame, kΩ, rad/s.
         label: of the branch.
-        name: what an engineer calls it, as "1st flapwise".
     """
 
     speed: float
@@ -35,7 +34,6 @@ class CriticalSpeed:
     per_rev: int
     frequency: float
     label: str
-    name: str
 
 
 @dataclass(frozen=True)
@@ -68,6 +66,13 @@ class CampbellResult(Rows):
     """
 
     index = ("speed", "label")
+    frequencies = OfTable(
+        "frequency",
+        "Frequencies in the rotating frame, (speeds, branches), rad/s; NaN where a branch is lost. With supports that "
+        "differ by direction they are those in the fixed frame.",
+    )
+    damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (speeds, branches); NaN where a branch is lost.")
+    growth = OfTable("growth", "Growth Re λ, (speeds, branches), 1/s; NaN where a branch is lost.")
 
     @property
     def labels(self) -> list[str]:
@@ -83,24 +88,6 @@ class CampbellResult(Rows):
     def refined(self) -> npt.NDArray[np.bool_]:
         """Which of `speeds` were not asked for, shape (speeds,)."""
         return np.array(list(self._refined().values()), dtype=bool)
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost.
-
-        With supports that differ by direction they are those in the fixed frame.
-        """
-        return self.column("frequency")
-
-    @property
-    def damping(self) -> Array:
-        """Damping ratios −Re λ/|λ|, shape (speeds, branches); NaN where a branch is lost."""
-        return self.column("damping")
-
-    @property
-    def growth(self) -> Array:
-        """Growth Re λ, shape (speeds, branches), 1/s; NaN where a branch is lost."""
-        return self.column("growth")
 
     @property
     def critical_speeds(self) -> list[CriticalSpeed]:
@@ -148,7 +135,7 @@ class CampbellResult(Rows):
 
         columns = [
             [str(b["branch"]) for b in branches],
-            [b["name"] for b in branches],
+            [b["label"] for b in branches],
             frequencies("frequency_first"),
             frequencies("frequency_last"),
             [f"{b['confidence']:.3f}" for b in branches],
@@ -157,7 +144,7 @@ class CampbellResult(Rows):
         head = ("branch", "name", first, last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
-            what = f"{c.name} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.name}, synchronous"
+            what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"
             critical.append((number(float(units.speeds(c.speed)), digits=8), what))
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:

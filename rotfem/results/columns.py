@@ -117,6 +117,8 @@ def described(column: str) -> tuple[str, str]:
     if column.startswith("tip_") and column[4:].rstrip("123") in ("u", "alpha", "theta"):
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
+    if column.endswith("_phase"):
+        return f"phase of {described(column.removesuffix('_phase'))[0]}", "rad"
     if column.startswith("shape_"):
         what, unit = described(column.removeprefix("shape_"))
         return f"shape, {what}{' × length' if unit == 'rad' else ''}", "1"

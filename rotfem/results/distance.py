@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 Array = npt.NDArray[Any]
 
@@ -54,7 +53,13 @@ class Series:
         if len(self.times) == 1:
             return np.broadcast_to(self.values, (len(times), self.values.shape[1]))
         last = np.append(np.diff(self.times) > 0.0, True)
-        return np.asarray(CubicSpline(self.times[last], self.values[last])(times))
+        own, values = self.times[last], self.values[last]
+        near = np.minimum(np.searchsorted(own, times - 1e-9 * own[-1]), len(own) - 1)
+        if np.allclose(own[near], times, rtol=0.0, atol=1e-9 * own[-1]):
+            return np.asarray(values[near])
+        from scipy.interpolate import CubicSpline  # slow to load, and steps of twice the length end at own rows
+
+        return np.asarray(CubicSpline(own, values)(times))
 
     def beside(self, other: Series) -> tuple[Series, Series]:
         """Return both at common rows: those of the one that has fewer, where both are; of a steady state the last."""
@@ -91,10 +96,12 @@ class Spectrum:
         values: λ, (modes,), rad/s; 0 of what is zero to round-off.
         shapes: sampled at the same places on every mesh, complex, (modes, samples), nan where one has none; None to
             pair modes by their order.
+        count: number of the first modes that count; the others are there to be paired with. All of them if None.
     """
 
     values: Array
     shapes: Array | None = None
+    count: int | None = None
 
     @property
     def scale(self) -> float:
@@ -106,14 +113,14 @@ class Spectrum:
 
         Of an eigenvalue that is zero it is relative to the smallest other one.
         """
-        own, there = self.values, other.values
+        own, there = self.values[: self.count], other.values
         if len(own) == 0 or len(there) == 0:
             return Distance(0.0 if len(own) == 0 else np.inf)
         off = np.abs(there[None, :] - own[:, None])
         if self.shapes is None or other.shapes is None:
             off = off[:, : len(own)].diagonal() if len(there) >= len(own) else np.full(len(own), np.inf)
         else:
-            alike = alikeness(self.shapes, other.shapes)
+            alike = alikeness(self.shapes[: self.count], other.shapes)
             off = np.where(alike >= 0.9 * alike.max(axis=1, keepdims=True), off, np.inf).min(axis=1)
         each = off / sizes(own)
         return Distance(float(each.max()), each=each)

@@ -28,7 +28,7 @@ from rotfem.results.columns import (
     per_cent,
 )
 from rotfem.results.files import json_text
-from rotfem.results.result import Array, Rows
+from rotfem.results.result import Array, OfTable, Rows
 from rotfem.results.surfaces import Surface
 
 #: Powers of ξ in a mode polynomial.
@@ -112,6 +112,10 @@ class ModesResult(Rows):
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)
     index = ("mode",)
+    frequencies = OfTable("frequency", "Frequencies in the rotating frame, (modes,), rad/s; 0 of a rigid body.")
+    frequencies_hz = OfTable("frequency_hz", "Frequencies in the rotating frame, (modes,), Hz.")
+    damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (modes,).")
+    growth = OfTable("growth", "Growth Re λ of every mode, (modes,), 1/s; negative where it dies away.")
 
     @property
     def speed(self) -> float:
@@ -122,26 +126,6 @@ class ModesResult(Rows):
     def labels(self) -> list[str]:
         """Name of every mode."""
         return [row["label"] for row in self.rows]
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (modes,), rad/s; the rigid-body mode of a free hub has 0."""
-        return self.column("frequency")
-
-    @property
-    def frequencies_hz(self) -> Array:
-        """Frequencies in the rotating frame, shape (modes,), Hz."""
-        return self.column("frequency_hz")
-
-    @property
-    def damping(self) -> Array:
-        """Damping ratios −Re λ/|λ|, shape (modes,)."""
-        return self.column("damping")
-
-    @property
-    def growth(self) -> Array:
-        """Growth Re λ of every mode, shape (modes,), 1/s; negative where it dies away."""
-        return self.column("growth")
 
     @property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
@@ -186,19 +170,20 @@ class ModesResult(Rows):
         modes = json_text({"speed": self.summary["speed"], "modes": self.rows})
         return {**super().texts(), **fitted, "modes.json": modes}
 
-    def _of_beam(self) -> Iterator[tuple[dict[str, Any], dict[str, Array], dict[str, tuple[Array, Array]]]]:
-        """Yield of every mode with a shape its number and names, real columns, and direction ↦ displacement, slope."""
+    def _over_span(self) -> Iterator[tuple[dict[str, Any], dict[str, Array]]]:
+        """Yield number, label and frequency of every mode with a shape, and its real columns over the span."""
         if self.triangles is not None:
             raise InputError("structure.type", "plate", "tables over the span are those of beams")
         for row, shape, _ in self.with_shapes():
-            columns = _real(shape)
-            found = {  # rotations of a shape are multiplied by the length of the beam
-                name: (columns[u], sign * columns[theta] / columns["x"][-1])
-                for name, kinds in DIRECTIONS.items()
-                for u, theta, sign in kinds
-                if u in columns and theta in columns
-            }
-            yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, columns, found
+            columns, length = _real(shape), shape["x"][-1]  # by which rotations of a shape are multiplied
+            out = {"span": columns["x"] / length}
+            for direction, kinds in DIRECTIONS.items():
+                for u, theta, sign in kinds:
+                    if u in columns and theta in columns:
+                        out[f"{direction}_displacement"] = columns[u]
+                        out[f"{direction}_slope"] = sign * columns[theta] / length
+            out |= {"twist": columns["theta1"] / length} if "theta1" in columns else {}
+            yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, out
 
     def mode_table(self) -> list[dict[str, Any]]:
         """Return one row a mode and node: displacement and slope in flap and lag, and twist, over the span.
@@ -210,16 +195,11 @@ class ModesResult(Rows):
         Raises:
             InputError: the structure is no beam.
         """
-        out = []
-        for mode, columns, found in self._of_beam():
-            values: dict[str, Array] = {"span": columns["x"] / columns["x"][-1]}
-            for direction, pair in found.items():
-                values |= dict(zip((f"{direction}_displacement", f"{direction}_slope"), pair, strict=True))
-            if "theta1" in columns:
-                values["twist"] = columns["theta1"] / columns["x"][-1]
-            rows = zip(*(column.tolist() for column in values.values()), strict=True)
-            out += [mode | dict(zip(values, row, strict=True)) for row in rows]
-        return out
+        return [
+            mode | dict(zip(columns, row, strict=True))
+            for mode, columns in self._over_span()
+            for row in zip(*(values.tolist() for values in columns.values()), strict=True)
+        ]
 
     def mode_polynomials(self) -> list[dict[str, Any]]:
         """Return one row a bending mode: the polynomial of its leading displacement, and how well it fits.
@@ -233,13 +213,14 @@ class ModesResult(Rows):
             InputError: the structure is no beam.
         """
         out: list[dict[str, Any]] = []
-        for mode, columns, found in self._of_beam():
-            sizes = {name: float(np.max(np.abs(shape))) for name, (shape, _) in found.items()}
+        for mode, columns in self._over_span():
+            shapes = {name: columns[f"{name}_displacement"] for name in DIRECTIONS if f"{name}_displacement" in columns}
+            sizes = {name: float(np.max(np.abs(shape))) for name, shape in shapes.items()}
             direction = max(sizes, key=lambda name: sizes[name])
-            shape = found[direction][0]
+            shape = shapes[direction]
             if sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
                 continue  # torsion and stretch, and shapes with a node at the tip
-            coefficients, off = fit(columns["x"] / columns["x"][-1], shape / shape[-1])
+            coefficients, off = fit(columns["span"], shape / shape[-1])
             number = 1 + sum(other["direction"] == direction for other in out)
             terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
             errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
@@ -261,7 +242,7 @@ class ModesResult(Rows):
         errors = [e if row["stability"] != "unresolved" else None for e, row in zip(errors, rows, strict=True)]
         columns = [
             [str(row["mode"]) for row in rows],
-            [row["name"] for row in rows],
+            [row["label"] for row in rows],
             numbers([float(in_unit(row["frequency"], first)) for row in rows], 8),
             numbers([row["frequency_hz"] for row in rows], 8),
             [per_cent(row["damping"]) for row in rows],
@@ -294,27 +275,20 @@ class ResponseResult(Rows):
         summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
         rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
             spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
-            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
-            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
-            all outputs; `peak` (1 at frequencies that were added to see a peak).
+            unit) and `tip_u2_phase` (rad, how far it is ahead of a load of phase 0); `peak` (1 at frequencies that were
+            added to see a peak).
         direct: complex amplitudes of the outputs, shape (frequencies, outputs).
-        modal: the same by modes.
     """
 
     direct: npt.NDArray[np.complex128]
-    modal: npt.NDArray[np.complex128]
     index = ("frequency",)
+    frequencies = OfTable("frequency", "Frequencies, (frequencies,), rad/s, increasing.")
     figure = "results.plots:response_figure"
 
     @property
     def outputs(self) -> list[str]:
         """Names of the outputs: of the tip `tip_u1`, …, of the root `root_f1`, …, of stations `M@2.5`, …."""
         return list(self.summary["outputs"])
-
-    @property
-    def frequencies(self) -> Array:
-        """Frequencies, rad/s, increasing."""
-        return self.column("frequency")
 
     def amplitude(self, output: str) -> Array:
         """Return the amplitude of an output over the frequencies, in its unit."""

@@ -62,10 +62,10 @@ class CheckResult(Result):
         """Inertia tensor about the clamp, kg·m², shape (3, 3)."""
         return np.array(self.summary["inertia_root"])
 
-    def data(self) -> dict[str, Columns]:
-        """Return the properties along a beam over `x`; of a plate the coordinates of its nodes."""
-        of_beam = Columns(self.columns, ("x",))
-        return {"check": of_beam if self.columns else Columns(self.nodes, dimension="node")}
+    @property
+    def table(self) -> Columns:
+        """Properties along a beam over `x`; of a plate the coordinates of its nodes."""
+        return Columns(self.columns, ("x",)) if self.columns else Columns(self.nodes, dimension="node")
 
     def tables(self) -> list[ShortTable]:
         """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
@@ -118,7 +118,7 @@ def check_figure(result: CheckResult) -> Figure:
         if len(names) > 1:
             axis.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     s = result.summary
-    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
+    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m, axes of the rotating frame", fontsize=10)
     return figure
 
 
@@ -146,7 +146,7 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
         axis.plot(r[:, i], r[:, j], "k", lw=1.2)
     center = result.summary["center_of_mass"]
     axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
-    dress(axis, f"{i + 1} (m)", f"{j + 1} (m)")
+    dress(axis, f"axis {i + 1} (m)", f"axis {j + 1} (m)")
     if (i, j) == (1, 2):  # the angles of sections are what they are
         axis.set_aspect("equal", adjustable="datalim")
 

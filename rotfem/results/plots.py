@@ -216,7 +216,7 @@ def shapes_figure(result: ModesResult) -> Figure:
                 drawn[name] = panel.plot(x, real, lw=1.4, color=f"C{c}", label=what)[0]
             if np.max(np.abs(imaginary)) > VISIBLE:
                 panel.plot(x, imaginary, lw=1.0, ls="--", color=f"C{c}")
-        caption(panel, f"{row['mode']}  {row['name']}, {frequency}")
+        caption(panel, f"{row['mode']}  {row['label']}, {frequency}")
         panel.set_xlim(x[0], x[-1])
         panel.set_ylabel("shape (–)")
     handles = [drawn[name] for name in names if name in drawn]
@@ -225,15 +225,13 @@ def shapes_figure(result: ModesResult) -> Figure:
 
 
 def response_figure(result: ResponseResult) -> Figure:
-    """Return amplitudes, direct and by modes (dashed), and phases over frequency, of tip, root and hub.
+    """Return amplitudes and phases over frequency, of tip, root and hub.
 
     A row has what is of one kind. Deep antiresonances, at most 5 % of the frequencies, are cut off.
     """
     units = ShownUnits.of(result.summary)
     own = {name: i for i, name in enumerate(result.outputs) if "@" not in name}  # no stations
-    title = (
-        f"{heading(result)}, at {units.speeds(result.summary['speed']):.6g} {units.speed}\namplitudes by modes dashed"
-    )
+    title = f"{heading(result)}, at {units.speeds(result.summary['speed']):.6g} {units.speed}"
     shown, title = not_zero({name: np.abs(result.direct[:, i]) for name, i in own.items()}, title)
     rows: dict[tuple[str, str], list[str]] = {}
     for name in shown:
@@ -249,9 +247,8 @@ def response_figure(result: ResponseResult) -> Figure:
         dress(left, y=f"amplitude {shown_unit(names[0])}")
         dress(right, y="phase (°)")
         for c, name in enumerate(names):
-            direct, modal = result.direct[:, own[name]], np.abs(result.modal[:, own[name]])
+            direct = result.direct[:, own[name]]
             left.semilogy(x, np.abs(direct), marker=mark, lw=1.3, color=f"C{c}")
-            left.semilogy(x, modal, lw=0.9, ls="--", color="0.3")
             phase = np.degrees(np.angle(direct))
             jumps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
             broken = np.insert(x, jumps, np.nan), np.insert(phase, jumps, np.nan)
@@ -356,6 +353,6 @@ def plate_modes_figure(result: ModesResult) -> Figure:
         name = f"u{1 + int(np.argmax(np.max(size, axis=1)))}"
         drawn = draw(axis, mesh, columns[name], clamped)
         drawn.set(cmap="RdBu_r", norm=Normalize(-1.0, 1.0))
-        axis.set_title(f"{row['mode']}  {row['name']}, {described(name)[0]}\n{frequency}", fontsize=9)
+        axis.set_title(f"{row['mode']}  {row['label']}, {described(name)[0]}\n{frequency}", fontsize=9)
     add_bar(figure, drawn, axes, "displacement (–)")
     return figure

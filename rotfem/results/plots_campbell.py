@@ -34,7 +34,7 @@ class Branch:
     """A branch as it is drawn, in the units that are shown.
 
     Attributes:
-        name: of its mode, as engineers say.
+        name: of its mode.
         number: from 1 on, decides the colour.
         speed, frequency, damping: over the speeds solved; damping ratios in per cent.
         doubtful: whether the step to a speed from the one before is ambiguous.
@@ -139,7 +139,7 @@ def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
         at = np.searchsorted(speed, [s for s, _ in further])
         out.append(
             Branch(
-                named["name"],
+                named["label"],
                 number,
                 units.speeds(np.insert(speed, at, [s for s, _ in further])),
                 units.frequencies(np.insert(frequency, at, [f for _, f in further])),

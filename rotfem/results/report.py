@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 
-from rotfem.results.columns import ZERO, ShownUnits, described, label, label_of
+from rotfem.results.columns import ZERO, Columns, ShownUnits, described, label, label_of, largest
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result, data_url
@@ -170,32 +170,25 @@ def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
 
 def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a table that a click on a heading sorts; dictionaries in a row become columns of their own."""
-    flat = [dict(_flat(row)) for row in rows[:MOST_ROWS]]
-    names = list(dict.fromkeys(name for row in flat for name in row))
-    if not flat:
+    columns = Columns.of_rows([dict(_flat(row)) for row in rows[:MOST_ROWS]])
+    if not columns.values:
         return ""
-    numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
-    numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # the scale below which these are 0
-    exact = ("residual", "error_bound", "mesh_error")  # near 0 and not shown as 0
-    least = {n: 0.0 if n in exact else ZERO * max(values, default=0.0) for n, values in numbers.items()}
-    head = "".join(f"<th{_kind(flat, n)}>{escape(label_of(n))}</th>" for n in names)
-    body = ""
-    for row in flat:
-        cells = ""
-        for n in names:
-            value = row.get(n)
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            small = isinstance(value, float) and abs(value) <= least[n]
-            data = f' data-value="{value!r}"' if number and np.isfinite(float(str(value))) else ""
-            cells += f"<td{_kind(flat, n)}{data}>{shown(0 if small else value)}</td>"
-        body += f"<tr>{cells}</tr>"
+    scales = dict.fromkeys(("residual", "error_bound", "mesh_error"), 0.0)  # near 0 and not shown as 0
+    scales |= {"damping": 1.0, "growth": largest(columns.values.get("frequency", ()))}
+    head, body = "", [""] * len(rows[:MOST_ROWS])
+    for name, values in columns.values.items():
+        is_number = name in columns.numbers
+        kind = "" if is_number else ' class="text"'
+        head += f"<th{kind}>{escape(label_of(name))}</th>"
+        scale = scales.get(name, largest(v for v in values if isinstance(v, float) and np.isfinite(v)))
+        for i, value in enumerate(values):
+            data = f' data-value="{value!r}"' if is_number and value is not None and np.isfinite(value) else ""
+            small = isinstance(value, float) and abs(value) <= ZERO * scale
+            body[i] += f"<td{kind}{data}>{shown(0 if small else value)}</td>"
     more = f"<p>the first {MOST_ROWS} of {len(rows)} rows</p>" if len(rows) > MOST_ROWS else ""
-    inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+    lines = "".join(f"<tr>{cells}</tr>" for cells in body)
+    inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>'
     return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
-
-
-def _kind(rows: Sequence[Mapping[str, Any]], name: str) -> str:
-    return ' class="text"' if any(isinstance(row.get(name), str) for row in rows) else ""
 
 
 def _flat(row: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -380,7 +373,7 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         v = np.stack([columns.get(f"u{i}_imag", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         scale = AMPLITUDE * length / max(float(np.max(np.hypot(u, v))), 1e-300)
         moves.append([np.round(scale * part, 5).tolist() for part in (u, v)])
-        said = f"{row.get('name', row['label'])}, {frequency}"
+        said = f"{row['label']}, {frequency}"
         cards += f"<figure><canvas></canvas><figcaption>{row['mode']}: {escape(said)}</figcaption></figure>"
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     extent = float(np.linalg.norm(high - low))

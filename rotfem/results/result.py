@@ -78,9 +78,14 @@ class Result(ABC):
         """Return file name ↦ text, in the order they are written: tables, then summary.json."""
         return {**self.texts(), "summary.json": json_text(self.summary)}
 
+    @property
     @abstractmethod
+    def table(self) -> Columns:
+        """Main table: what pandas and, with more of some results, xarray have."""
+
     def data(self) -> dict[str, Columns]:
-        """Return name ↦ columns of every table there is, the main one first."""
+        """Return name of a CSV file, without its ending ↦ its columns."""
+        return {self.summary["command"]: self.table}
 
     def column(self, name: str) -> Array:
         """Return the numbers of a column of the main table, such as `frequency`: of every row, or over its grid.
@@ -88,10 +93,9 @@ class Result(ABC):
         Raises:
             KeyError: there is none of that name.
         """
-        title, columns = next(iter(self.data().items()))
-        if name not in columns.numbers:
-            raise KeyError(f"no number {name!r} in {title}; there are {', '.join(columns.numbers)}")
-        return np.asarray(columns.grid(name)[1], dtype=np.float64)
+        if name not in self.table.numbers:
+            raise KeyError(f"no number {name!r} in the table; there are {', '.join(self.table.numbers)}")
+        return np.asarray(self.table.grid(name)[1], dtype=np.float64)
 
     def texts(self) -> dict[str, str]:
         """Return file name ↦ text of the tables."""
@@ -115,11 +119,11 @@ class Result(ABC):
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the main table, labelled by what its rows are of."""
-        return next(iter(self.data().values())).to_pandas()
+        return self.table.to_pandas()
 
     def arrays(self) -> Variables:
         """Return the labelled arrays, name ↦ dimensions and values: the columns of the main table."""
-        return next(iter(self.data().values())).variables()
+        return self.table.variables()
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the result as labelled arrays (see `arrays`) with `units` and `long_name` among their attributes."""
@@ -187,9 +191,25 @@ class Rows(Result):
         """Return the rows as a table has them, with one value a name, and in the units shown too."""
         return ShownUnits.of(self.summary).rows(self.rows)
 
-    def data(self) -> dict[str, Columns]:
-        """Return the rows as a table that is called after the command."""
-        return {self.summary.get("command", "rows"): Columns.of_rows(self.flat_rows(), self.index, self.dimension)}
+    @property
+    def table(self) -> Columns:
+        """The rows as columns, labelled by `index`."""
+        return Columns.of_rows(self.flat_rows(), self.index, self.dimension)
+
+
+class OfTable:
+    """Attribute of a result that holds a column of its main table.
+
+    Args:
+        name: of the column.
+        doc: what it is, its shape and unit.
+    """
+
+    def __init__(self, name: str, doc: str):
+        self.name, self.__doc__ = name, doc
+
+    def __get__(self, result: Result | None, of: type[Result]) -> Array:
+        return self if result is None else result.column(self.name)  # type: ignore[return-value]
 
 
 def image(figure: Figure, dpi: int, format: str = "png") -> bytes:

@@ -91,19 +91,15 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         if self.comm.rank == 0:
             try:
                 done = work()
-            except (OutputError, SceneError) as error:
+            except (ComputationError, OutputError, SceneError) as error:
                 problem = error
-        found: tuple[T, OutputError | SceneError | None] = self.comm.bcast((done, problem))
+        found: tuple[T, Exception | None] = self.comm.bcast((done, problem))
         if found[1] is not None:
             raise found[1]
         return found[0]
 
     def begin(self, keep: Collection[str] = ()) -> None:
-        """Say that a computation is running, and remove the results of the one before but for some names.
-
-        Raises:
-            OutputError: summary.json cannot be written.
-        """
+        """Say that a computation is running, and remove the results of the one before but for some names."""
         if self.summary:
             return
         self.summary = {"command": self.command, "status": RUNNING, "warnings": []}
@@ -119,11 +115,7 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         return write_text(self.path / SUMMARY, json_text(self.summary))
 
     def grow(self, name: str, table: Table) -> LiveTable | None:
-        """Return a table that is on disk while it grows; None on other ranks than the first.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Return a table that is on disk while it grows; None on other ranks than the first."""
 
         def begin() -> None:
             self._live = LiveTable(self.path / name, table)
@@ -132,32 +124,21 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         return self._live
 
     def publish(self, result: Result) -> list[Path]:
-        """Write the tables of a result and its summary; return their paths.
-
-        Raises:
-            OutputError: one cannot be written.
-        """
-        self.begin()
-        tables = self.first_does(lambda: [write_text(self.path / name, text) for name, text in result.texts().items()])
+        """Write the tables of a result and its summary; return their paths."""
+        tables = self._tables(result)
         return [*tables, self.first_does(lambda: self.summarise(result.summary))]
 
+    def _tables(self, result: Result) -> list[Path]:
+        self.begin()
+        return self.first_does(lambda: [write_text(self.path / name, text) for name, text in result.texts().items()])
+
     def write(self, result: Result, plots: bool, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
-        """Write a result, tables first, then large files and figures; return what went wrong with these.
-
-        Args:
-            result: the result.
-            plots: whether its figures are wanted.
-            further: what else is to be written, on rank 0.
-
-        Raises:
-            OutputError: a table cannot be written.
-        """
+        """Write a result, tables first, then large files and figures; return what went wrong with these."""
         fields: Writer | None = getattr(result, "fields", None)
         writers = [(write, False) for write in (*result.large(), *further, *([result.draw] if plots else []))]
         if fields is not None:
             writers.append((fields, result.summary.get("shared") == "mesh"))
-        self.begin()
-        self.first_does(lambda: [write_text(self.path / name, text) for name, text in result.texts().items()])
+        self._tables(result)
         self.summary = {**result.summary, "status": RUNNING}
         found = [self._problem(write, together) for write, together in writers]
         problems = [problem for problem in found if problem is not None]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import Columns, ShortTable, Variables, by_unit, dataset, largest, named, number
-from rotfem.results.result import Array, Result
+from rotfem.results.result import Array, OfTable, Result
 from rotfem.short import short_fields
 
 if TYPE_CHECKING:
@@ -109,10 +109,7 @@ class RunResult(Result):
     resultants: dict[str, Array] = field(default_factory=dict)
     further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
-    @property
-    def t(self) -> Array:
-        """Times of the history, shape (n,), s."""
-        return self.column("t")
+    t = OfTable("t", "Times of the history, shape (n,), s.")
 
     @property
     def tip(self) -> dict[str, Array]:
@@ -129,11 +126,16 @@ class RunResult(Result):
         """Figures of merit: of every tip component smallest and largest value, their times, and the last value."""
         return dict(self.summary["figures"])
 
+    @property
+    def table(self) -> Columns:
+        """The history over `t`."""
+        return Columns(self.history, ("t",))
+
     def data(self) -> dict[str, Columns]:
         """Return the history, the shape at its end and the stress resultants, as far as there are any."""
         of_nodes = {"shape": self.shape, "resultants": self.resultants}
         nodes = {name: Columns(columns, dimension="node") for name, columns in of_nodes.items() if columns}
-        return {"history": Columns(self.history, ("t",)), **nodes}
+        return {"history": self.table, **nodes}
 
     def texts(self) -> dict[str, str]:
         """Return a CSV file of each table, and stations.csv where that is asked for."""

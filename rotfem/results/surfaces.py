@@ -133,7 +133,7 @@ def animate(result: Any, mode: int, folder: Path) -> list[Path]:
         bar |= {"label_font_size": 14, "position_x": 0.3, "width": 0.4, "height": 0.06}
         plotter.add_mesh(rest.extract_feature_edges(30.0), color="gray", line_width=1)
         plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), scalar_bar_args=bar)
-        title = f"mode {row['mode']}: {row['name']}, {frequency} at {speed}"
+        title = f"mode {row['mode']}: {row['label']}, {frequency} at {speed}"
         plotter.add_text(title, font_size=11, position="upper_edge")
         plotter.add_axes(xlabel="1", ylabel="2", zlabel="3")
         plotter.camera_position = [centre + size * np.array([0.7, -1.6, 1.0]), centre, (0, 0, 1)]

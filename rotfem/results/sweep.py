@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import ZERO, Columns, ShortTable, label_of, numbers
+from rotfem.results.columns import ZERO, ShortTable, label_of, numbers
 from rotfem.results.files import writing
 from rotfem.results.result import Rows
 
@@ -65,7 +65,7 @@ class SweepResult(Rows):
 
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
-        return np.asarray(Columns.of_rows(self.rows, self.index).grid(name)[1], dtype=np.float64)
+        return np.asarray(self.table.grid(name)[1], dtype=np.float64)
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes sweep.nc."""

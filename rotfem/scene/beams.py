@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, TypeAdapter, ValidationError, ValidationInfo
+from pydantic import AfterValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
 
 from rotfem.places import apart
 from rotfem.scene.blades.deck import Asked, keys_of
@@ -19,7 +19,7 @@ from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.span_tables import symmetric
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import BY_SHAPE, SceneModel, along, by_type, in_units, problem, problems_at, unit
+from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
     DIGITS,
     ROUND_OFF,
@@ -95,7 +95,7 @@ class BeamStructure(StructureTable):
     hub_radius: Length = 0.0
     tip_mass: Mass = 0.0
     masses: tuple[PointMass, ...] = ()
-    damping: Damping = Field(default_factory=Damping)
+    damping: Damping = empty()
 
     if TYPE_CHECKING:
         section: PlanarSection | SpatialSection
@@ -160,7 +160,7 @@ class PlanarBeamStructure(BeamStructure):
     is_planar: ClassVar[bool] = True
     type: Literal["planar_beam"] = "planar_beam"
     tip_inertia: Annotated[NonNegative, unit("kg*m**2")] = 0.0
-    root: Root = Field(default_factory=Root)
+    root: Root = empty()
     section: PlanarSection
 
     @property
@@ -218,7 +218,7 @@ class SpatialBeamStructure(BeamStructure):
     sweep: Annotated[Span[Number], AfterValidator(_check_sweep), along("rad")] = 0.0
     line: Line | None = None
     precone: Annotated[Number, unit("rad")] = 0.0
-    root: SpatialRoot = Field(default_factory=SpatialRoot)
+    root: SpatialRoot = empty()
     supports: tuple[Support, ...] = ()
 
     @property
@@ -313,12 +313,11 @@ class SpatialBeamStructure(BeamStructure):
             raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
 
 
-Structure = Annotated[
-    Annotated[PlanarBeamStructure, Tag("<planar_beam>")]
-    | Annotated[SpatialBeamStructure, Tag("<spatial_beam>")]
-    | Annotated[PlateStructure, Tag("<plate>")],
-    Discriminator(by_type),
-]
+if TYPE_CHECKING:
+    Structure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
+else:
+    _TYPES = {"planar_beam": PlanarBeamStructure, "spatial_beam": SpatialBeamStructure, "plate": PlateStructure}
+    Structure = Annotated[Any, one_of(_TYPES)]
 
 
 @cache

@@ -392,10 +392,6 @@ class PointLoad(SceneModel):
     moment: MomentLoad | None = None
     kind: Literal["dead", "follower"] = "dead"
 
-    def kind_of(self, load: Load) -> str:
-        """Return the kind of one of the two."""
-        return load.kind if "kind" in load.model_fields_set else self.kind
-
     def _check(self) -> None:
         if self.force is None and self.moment is None:
             raise problem("force", None, "give force, moment, or both")
@@ -422,14 +418,15 @@ class Loads(SceneModel):
     pressure: Pressure | None = None
     at: tuple[PointLoad, ...] = ()
 
-    @property
-    def named(self) -> dict[str, Load]:
-        """All that are given, by name: "tip_force", …, "at.0.force", "at.0.moment"."""
-        names = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
-        given = {name: getattr(self, name) for name in names}
+    def named(self) -> Iterator[tuple[str, Load, str]]:
+        """Yield name, load and kind of all that are given: "tip_force", …, "at.0.force", "at.0.moment"."""
+        for name in type(self).model_fields:
+            if isinstance(load := getattr(self, name), Load):
+                yield name, load, load.kind
         for i, point in enumerate(self.at):
-            given |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
-        return {name: load for name, load in given.items() if load is not None}
+            for name, load in (("force", point.force), ("moment", point.moment)):
+                if load is not None:
+                    yield f"at.{i}.{name}", load, load.kind if "kind" in load.model_fields_set else point.kind
 
 
 # --- checks against what the loads work on ------------------------------------------------------------------------
@@ -441,7 +438,7 @@ def check_loads(structure: Any, free_hub: bool, loads: Loads) -> None:
         check_place(f"loads.at.{i}.x", structure, point.x)
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
-    for name, load in loads.named.items():
+    for name, load, _ in loads.named():
         key = f"loads.{name}"
         if load.VECTORS.sizes == MOMENT.sizes:
             _check_moment(key, structure, load)
@@ -495,7 +492,7 @@ def check_tables(file: str, structure: Any, loads: Loads, when: str) -> None:
 
     In a history such a table is over time unless it runs from 0 to the length.
     """
-    for name, load in loads.named.items():
+    for name, load, _ in loads.named():
         if not isinstance(load, SpanLoad) or load.table is None:
             continue
         why = None

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, StrictBool, Tag, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Field, StrictBool
 
-from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.loads import Signal, TimeFunction, function_of
-from rotfem.scene.table import SceneModel, by_type, problem, unit
+from rotfem.scene.table import SceneModel, one_of, problem, unit
 from rotfem.scene.values import (
     Matrix,
     NonNegative,
@@ -21,10 +20,8 @@ from rotfem.scene.values import (
     WithParameters,
 )
 
-Vector3 = tuple[float, float, float]
 
-
-def _any(axis: Vector3) -> Vector3:
+def _any(axis: tuple[float, ...]) -> tuple[float, ...]:
     if not any(axis):
         raise problem("", None, "must be a direction; not all three components can be 0")
     return axis
@@ -57,16 +54,6 @@ class Motion(SceneModel):
 
     axis: Annotated[Vector, AfterValidator(_any)] = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        """Refuse keys of other types of motion, by their types."""
-        if data.get("type") in BUILT_IN:
-            for key in (key for key in data if key not in cls.model_fields):
-                if types := [show(table.name) for table in _TABLES if key in table.model_fields]:
-                    why = f"has no meaning with type = {show(data['type'])}; it belongs to type = {', '.join(types)}"
-                    raise problem(key, data[key], why)
-        return data
 
 
 class ConstantMotion(Motion):
@@ -181,21 +168,7 @@ _TABLES = (ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion, CallableMoti
 for _table in _TABLES:
     register(_table)
 
-#: Types of motion that have a table of their own.
-BUILT_IN = tuple(table.name for table in _TABLES)
-
-
-def _tag(value: Any) -> str:
-    tag = by_type(value)
-    return tag if tag[1:-1] in BUILT_IN else "<law>"
-
-
-AnyMotion = Annotated[
-    Annotated[ConstantMotion, Tag("<constant>")]
-    | Annotated[SpinUpMotion, Tag("<spin_up>")]
-    | Annotated[TableMotion, Tag("<table>")]
-    | Annotated[TorqueMotion, Tag("<torque>")]
-    | Annotated[CallableMotion, Tag("<callable>")]
-    | Annotated[LawMotion, Tag("<law>")],
-    Discriminator(_tag),
-]
+if TYPE_CHECKING:
+    AnyMotion = ConstantMotion | SpinUpMotion | TableMotion | TorqueMotion | CallableMotion | LawMotion
+else:
+    AnyMotion = Annotated[Any, one_of({table.name: table for table in _TABLES}, LawMotion)]

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import Way, along, choose_way, problem, problems_at, unit
+from rotfem.scene.table import Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
     Array,
     NonNegative,
@@ -86,7 +86,7 @@ class PlateStructure(StructureTable):
     hub_offset: Annotated[Vector, unit("m")] | None = None
     point_masses: Annotated[tuple[tuple[Number, Number, Positive], ...], unit("m", "m", "kg")] = ()
     line_masses: dict[str, Annotated[Positive, unit("kg/m")]] = Field(default_factory=dict)
-    damping: Damping = Field(default_factory=Damping)
+    damping: Damping = empty()
 
     @property
     def mesh_file(self) -> str | None:

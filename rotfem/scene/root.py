@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool
@@ -117,7 +117,7 @@ class SpatialRoot(Root):
     flap_damping: Damper = 0.0
     pitch_stiffness: Spring | None = None
     pitch_damping: Damper = 0.0
-    pitch: PitchAngle = Field(default_factory=lambda: PitchAngle(value=0.0))
+    pitch: PitchAngle = Field(default_factory=lambda: cast(Any, 0.0), validate_default=True)
     driven: StrictBool = False
 
     def check(self, precone: float) -> None:

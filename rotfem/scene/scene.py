@@ -9,10 +9,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
 
 from rotfem import registry
 from rotfem.errors import SceneError, show
@@ -23,7 +23,7 @@ from rotfem.scene.loads import Loads, check_loads, check_tables
 from rotfem.scene.motion import AnyMotion, Motion
 from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.structure import designed
-from rotfem.scene.table import SceneModel, problem, scene_error, unit
+from rotfem.scene.table import SceneModel, empty, problem, scene_error, unit
 from rotfem.scene.values import ROUND_OFF, Matrix
 from rotfem.short import short
 from rotfem.units import unit_of
@@ -49,6 +49,21 @@ def abridged(value: Any, given: Any) -> Any:
 #: A relative error that may be asked for, and CPU seconds that it may take.
 Accuracy = Annotated[float, Field(strict=True, ge=1e-8, le=0.5)]
 Budget = Annotated[float, Field(strict=True, gt=0, le=1e9), unit("s")]
+
+
+def _as_mesh(value: Any, info: ValidationInfo) -> BeamMesh | PlateMesh:
+    """Return the mesh of the structure's type."""
+    structure = info.data.get("structure")
+    kind = (info.context or {}).get("type") or getattr(structure, "type", None)
+    table = PlateMesh if kind == "plate" else BeamMesh
+    mesh: BeamMesh | PlateMesh = table.model_validate(value, context=info.context)
+    return mesh if structure is None else mesh.suited(structure)
+
+
+if TYPE_CHECKING:
+    Mesh = BeamMesh | PlateMesh
+else:
+    Mesh = Annotated[Any, PlainValidator(_as_mesh)]
 
 
 class Scene(SceneModel):
@@ -78,15 +93,15 @@ class Scene(SceneModel):
 
     structure: Structure
     motion: AnyMotion
-    model: Model = Field(default_factory=Model)
-    initial: Initial = Field(default_factory=Initial)
-    loads: Loads = Field(default_factory=Loads)
-    mesh: BeamMesh | PlateMesh = Field(default_factory=lambda: cast(Any, {}), validate_default=True)
+    model: Model = empty()
+    initial: Initial = empty()
+    loads: Loads = empty()
+    mesh: Mesh = empty()
     time: Time | None = None
-    modes: Modes = Field(default_factory=Modes)
-    solver: Solver = Field(default_factory=Solver)
-    output: OutputTable = Field(default_factory=OutputTable)
-    extensions: Extensions = Field(default_factory=Extensions)
+    modes: Modes = empty()
+    solver: Solver = empty()
+    output: OutputTable = empty()
+    extensions: Extensions = empty()
     accuracy: Accuracy | None = None
     accuracy_of: Literal["tip", "root_moment", "frequencies"] | None = None
     accuracy_budget: Budget | None = None
@@ -231,16 +246,6 @@ class Scene(SceneModel):
         """
         check_tables(self._file, self.structure, self.loads, when)
 
-    @field_validator("mesh", mode="plain")
-    @classmethod
-    def _read_mesh(cls, value: Any, info: ValidationInfo) -> BeamMesh | PlateMesh:
-        """Return the mesh of the structure's type."""
-        structure = info.data.get("structure")
-        kind = (info.context or {}).get("type") or getattr(structure, "type", None)
-        table = PlateMesh if kind == "plate" else BeamMesh
-        mesh: BeamMesh | PlateMesh = table.model_validate(value, context=info.context)
-        return mesh if structure is None else mesh.suited(structure)
-
     def _check(self) -> None:
         check_together(self)
 
@@ -322,7 +327,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS.padded}
+    vectors |= {f"loads.{name}": load for name, load, _ in loads.named() if load.VECTORS.padded}
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
             value = list(signal.value) if signal.value is not None else None

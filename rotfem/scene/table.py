@@ -15,6 +15,8 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Discriminator,
+    Field,
+    PlainValidator,
     ValidationError,
     ValidationInfo,
     model_validator,
@@ -123,6 +125,8 @@ def along(name: str) -> BeforeValidator:
 
 # --- tables -----------------------------------------------------------------------------------------------------------
 
+_TABLE = "must be a table of key = value pairs"
+
 
 class SceneModel(BaseModel):
     """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
@@ -177,7 +181,7 @@ class SceneModel(BaseModel):
             return data
         data = cls._table(data)
         if not isinstance(data, Mapping):
-            raise problem("", data, "must be a table of key = value pairs")
+            raise problem("", data, _TABLE)
         data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
@@ -191,10 +195,30 @@ class SceneModel(BaseModel):
         return self
 
 
-def by_type(value: Any) -> str:
-    """Return the tag of a table of several types: its key `type`, in the brackets that mark tags in paths of errors."""
-    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
-    return f"<{'' if kind is None else kind}>"
+def empty() -> Any:
+    """Return the default of a table whose keys all have defaults."""
+    return Field(default_factory=dict, validate_default=True)
+
+
+def one_of(tables: Mapping[str, type[SceneModel]], other: type[SceneModel] | None = None) -> PlainValidator:
+    """Return what reads a table of the type that its key `type` names; of any other type it is `other`, if given.
+
+    Not a union of pydantic's: the classes that a scene does not name need no validators, which take time to make.
+    """
+
+    def read(value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, SceneModel):
+            return value
+        if not isinstance(value, Mapping):
+            raise problem("", value, _TABLE)
+        kind = value.get("type")
+        table = tables.get(kind, other) if isinstance(kind, str) else other
+        if table is None:
+            missing = "required key is missing; " if kind is None else did_you_mean(kind, tables)
+            raise problem("type", kind, f"{missing}allowed: {', '.join(map(show, tables))}")
+        return table.model_validate(value, context=info.context)
+
+    return PlainValidator(read)
 
 
 #: Annotations of types that lists and other values have: those tagged "<rows>" and "<one>".
@@ -244,8 +268,6 @@ def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
 
 # --- errors -----------------------------------------------------------------------------------------------------------
 
-_TABLE = "must be a table of key = value pairs"
-
 #: Types of pydantic's errors ↦ what is allowed, with what they know of it.
 _ALLOWED = {
     "missing": "required key is missing",
@@ -284,15 +306,9 @@ def _problem(details: dict[str, Any]) -> Problem:
         reason = context["reason"]
     elif kind == "missing" and isinstance(details["loc"][-1], int):
         path, reason = path[:-1], f"must have more entries than {len(value)}"
-    elif kind == "union_tag_invalid" and not isinstance(value, Mapping):
-        reason = _TABLE
-    elif kind in ("literal_error", "union_tag_invalid"):
-        names = re.findall(r"'<?([^'>]*)>?'", context.get("expected") or context["expected_tags"])
-        reason = f"allowed: {', '.join(map(show, names))}"
-        if kind == "union_tag_invalid":
-            path, value = [*path, "type"], context["tag"][1:-1] or None
-            reason = reason if value is not None else f"required key is missing; {reason}"
-        reason = f"{did_you_mean(value, names)}{reason}"
+    elif kind == "literal_error":
+        names = re.findall(r"'([^']*)'", context["expected"])
+        reason = f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}"
     else:
         reason = _ALLOWED[kind].format(**context) if kind in _ALLOWED else str(details["msg"])
     if isinstance(value, Mapping):

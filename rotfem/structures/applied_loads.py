@@ -1,4 +1,4 @@
-"""The amplitudes of loads in the forms: constants and fields.
+"""What loads do to a structure: their work, and their amplitudes in the forms, constants and fields.
 
 The force (or moment) of a load in the forms is f = Σ_k a_k s_k (`rotfem.mechanics.loads`). The amplitudes of a uniform
 load are the components of a constant, those of a load over the span the factors of shapes, whose sum is a field. A
@@ -8,14 +8,18 @@ function of place has its values at the nodes as amplitudes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
-from rotfem.mechanics.loads import Load, PlaceLoad, Shapes
+from rotfem.mechanics.bodies import AppliedLoad, Kinematics
+from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, Shapes, is_moment
+from rotfem.mechanics.problem import Problem
+from rotfem.numerics import forms
+from rotfem.structures.points import Points
 from rotfem.structures.section_fields import field_values
 
 Array = npt.NDArray[np.float64]
@@ -129,3 +133,93 @@ def first(values: Array, n: int) -> Array:
 
 def _space(structure: Any, family: str, degree: int, n: int) -> fem.FunctionSpace:
     return fem.functionspace(structure.mesh, (family, degree, (n,) if n > 1 else ()))
+
+
+class Loaded:
+    """The part of a structure that loads work on.
+
+    Attributes:
+        problem: with its loads.
+        k: the unknowns with their rates.
+        dx: measure of the whole structure.
+        tip: measure of its end.
+        points: where loads or masses are at a point.
+        load_constants: name of a load ↦ its amplitude in the forms.
+    """
+
+    #: Components of a force, and of a moment.
+    dimension: ClassVar[int] = 3
+    turns_in: ClassVar[int] = 3
+
+    k: Kinematics
+    mesh: Any
+    dx: Any
+    tip: Any
+    points: Points
+
+    def __init__(self, problem: Problem):
+        self.problem = problem
+        self.load_constants: dict[str, Amplitude] = {}
+
+    def position(self, q: Any) -> Any:
+        """Return the axis or mid-surface r(q), frame components (m)."""
+        raise NotImplementedError
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
+        raise NotImplementedError
+
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment m (components of its amplitude) on the rotations."""
+        raise NotImplementedError
+
+    def place(self, point: Array) -> Any:
+        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
+        return float(point[0])
+
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
+        raise NotImplementedError
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction."""
+        given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
+        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
+
+    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+        """Return the work of one load."""
+        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
+        if is_moment(name):
+            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
+        f = self.amplitude(name, load, self.dimension)
+        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
+        force = self.spread(name, vector if dead else self.turned(q, vector))
+        return [AppliedLoad(name, force, self.position(q), measure, dead)]
+
+    def _measure(self, name: str) -> Any:
+        """Return what a load works on: the tip, a point, or the whole structure."""
+        if name.startswith("at."):
+            return self.points.measure(self.problem.loads.places[int(name.split(".")[1])])
+        return self.tip if name.startswith("tip") else self.dx
+
+    def spread(self, name: str, load: Any) -> Any:
+        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
+        return load
+
+    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
+        """Return a load in the forms, its first `size` components, and remember its amplitude."""
+        made: Amplitude
+        if isinstance(load, PlaceLoad):
+            made = SpanField.of_place(self, load, size)
+        elif load.is_uniform:
+            made = Amplitude(forms.constant(self.mesh, np.zeros(size)), lambda t: first(load.at(t), size))
+        else:
+            made = SpanField.of_shapes(self, load, size)
+        made.dead = load.kind == "dead"
+        self.load_constants[name] = made
+        return made.vector
+
+    def update_loads(self, turn: Array | None = None) -> None:
+        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead loads."""
+        for amplitude in self.load_constants.values():
+            amplitude.update(turn if amplitude.dead else None)

@@ -21,7 +21,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
 from rotfem.structures.meshes.plate_mesh import beam_nodes, boundary_tags
-from rotfem.structures.mode_names import in_phase, sign_changes
+from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative
 from rotfem.structures.structure import Array, PointValues, Structure, check_memory
@@ -66,7 +66,7 @@ class Beam(Structure):
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.masses = getattr(self.data, "masses", ())
         supported = getattr(self.data, "supports", ())
-        points = [*(point.x for point in self.point_loads), *((at.x,) for at in (*self.masses, *supported))]
+        points = [*problem.loads.places, *((at.x,) for at in (*self.masses, *supported))]
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
@@ -176,9 +176,10 @@ class Beam(Structure):
         """Numbers of the nodes in their order along the beam."""
         return np.argsort(self._points[:, 0])
 
-    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
-        """Return the family of a mode shape (n, components) and its number: one more than its nodes."""
-        return family, str(sign_changes(in_phase(self.oriented(values)[:, self.families[family][1]])) + 1)
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
+        """Return the name of a mode shape (n, components) by its family and its number, one more than its nodes."""
+        number = sign_changes(in_phase(self.oriented(values)[:, self.families[family][1]])) + 1
+        return ModeName(WORDS.get(family, family), number)
 
 
 # --- the planar beam --------------------------------------------------------------------------------------------------

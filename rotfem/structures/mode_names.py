@@ -7,50 +7,51 @@ m = 1 (Genta, Dynamics of Rotating Systems, 2005, section 2.4). From the fixed f
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from string import ascii_lowercase
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-#: Family of a beam's modes ↦ what blade engineers call it.
-ENGINEERS_WORDS = {"flap": "flapwise", "lag": "edgewise"}
-
-#: Kind, number, circles of a disk, letter of one of several, and what follows, as in "lag–flap 3a, slow".
-LABEL = re.compile(r"(?P<kind>\D+) (?P<number>\d+)(?:\.(?P<circle>\d+))?(?P<letter>[a-z]?),?(?P<rest>(?: .*)?)")
+#: Family of a beam's modes ↦ its word in names.
+WORDS = {"flap": "flapwise", "lag": "edgewise"}
 
 
-def engineers_name(label: str) -> str:
-    """Return what an engineer calls a mode.
+class ModeName(NamedTuple):
+    """The name of a mode: "1st flapwise", "2nd edgewise–flapwise", "4th edgewise, slow", "1st forward whirl".
 
-    "flap 1" is "1st flapwise", "lag–flap 2" "2nd edgewise–flapwise", "torsion 1" "1st torsion", "bending 1 backward"
-    "1st backward whirl"; "diameters 2.1 forward" of a disk "2 diameters, forward", "diameters 0.2" "0 diameters,
-    1 circle".
-
-    Args:
-        label: as results have it; one of another form is returned as it is.
+    Attributes:
+        kind: "flapwise", "edgewise", "axial", "torsion", "bending", …, two of them where the mode is mixed.
+        number: from 1 on.
+        nodal: nodal lines in the place of kind and number: "2 nodal diameters, 1 circle".
+        rest: "slow", "fast", "forward", "backward", or nothing.
+        letter: of one of several that are called the same.
     """
-    found = LABEL.fullmatch(label)
-    if found is None:
-        return label
-    kind, number, circle, letter, rest = found.group("kind", "number", "circle", "letter", "rest")
-    rest = rest.strip()
-    if kind == "bending" and rest in ("forward", "backward"):  # of a shaft
-        kind, rest = f"{rest} whirl", ""
-    after = [word for word in (letter, rest) if word]
-    if circle is None:
-        words = "–".join(ENGINEERS_WORDS.get(word, word) for word in kind.split("–"))
-        return ", ".join([f"{number}{ordinal_ending(int(number))} {words}", *after])
-    if kind != "diameters":
-        return label
-    circles = int(circle) - 1
-    lines = [f"{number} diameter{'s' * (number != '1')}", *([f"{circles} circle{'s' * (circles > 1)}"] * (circles > 0))]
-    return ", ".join([*lines, *after])
+
+    kind: str
+    number: int
+    nodal: str = ""
+    rest: str = ""
+    letter: str = ""
+
+    def __str__(self) -> str:
+        own = self.nodal or f"{self.number}{ordinal_ending(self.number)} {self.kind}"
+        return ", ".join(part for part in (own, self.letter, self.rest) if part)
+
+    def mixed_with(self, family: str) -> ModeName:
+        """Return the name of a mode that belongs to another family, too."""
+        other = f"–{WORDS.get(family, family)}"
+        return self._replace(kind=self.kind + other, nodal=self.nodal and self.nodal + other)
+
+
+def nodal_lines(diameters: int, circles: int) -> str:
+    """Return the nodal lines of a disk in words: "1 nodal diameter", "0 nodal diameters, 1 circle"."""
+    circle = f", {circles} circle{'s' * (circles != 1)}" if circles else ""
+    return f"{diameters} nodal diameter{'s' * (diameters != 1)}{circle}"
 
 
 def ordinal_ending(number: int) -> str:
@@ -131,12 +132,12 @@ def sign_changes(y: npt.NDArray[np.float64], noise: float = 1e-3) -> int:
 STATIONS, ACROSS = 24, 4
 
 
-def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any]) -> tuple[str, str]:
-    """Return the kind and number of a plate mode.
+def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any]) -> ModeName:
+    """Return the name of a plate mode.
 
-    A plate clamped along an edge has "bending n" (n − 1 nodal lines across it, none along), "torsion n" (one line
-    along), "chordwise m.n" (m ≥ 2 lines along) and "in-plane n"; a disk clamped inside "diameters m.n": m nodal
-    diameters, n − 1 circles beside the clamp.
+    A plate clamped along an edge has "nth bending" (n − 1 nodal lines across it, none along), "nth torsion" (one line
+    along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk clamped inside "m nodal diameters, s
+    circles", beside the clamp.
 
     Args:
         family: "bending" or "in-plane".
@@ -148,13 +149,14 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
     centre = np.array([np.mean(x1), np.mean(x2)])
     if _is_disk(x1 - centre[0], x2 - centre[1]):
         diameters, circles = _polar_lines(x1 - centre[0], x2 - centre[1], real)
-        return ("diameters" if family == "bending" else "in-plane"), f"{diameters}.{circles + 1}"
+        lines = nodal_lines(diameters, circles)
+        return ModeName(family, 1, lines if family == "bending" else f"in-plane, {lines}")
     along, across = _lines(x1, x2, real)
     if family != "bending":
-        return family, str(across + 1)
+        return ModeName(family, across + 1)
     if along > 1:
-        return "chordwise", f"{along}.{across + 1}"
-    return ("bending", "torsion")[along], str(across + 1)
+        return ModeName("chordwise", across + 1, f"chordwise ({along},{across + 1})")
+    return ModeName(("bending", "torsion")[along], across + 1)
 
 
 def disk_wave(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any], axis: float) -> Wave | None:
@@ -238,59 +240,61 @@ def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) 
 
 
 def with_overdamped(
-    names: list[str], values: npt.NDArray[Any], energies: tuple[npt.NDArray[Any], ...], sure: npt.NDArray[Any]
-) -> list[str]:
-    """Return the names of modes, those of overdamped ones as "lag 4, slow" and "lag 4, fast".
+    names: list[ModeName], values: npt.NDArray[Any], energies: tuple[npt.NDArray[Any], ...], sure: npt.NDArray[Any]
+) -> list[ModeName]:
+    """Return the names of modes, those of overdamped ones as "4th edgewise, slow" and "4th edgewise, fast".
 
     The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
     undamped mode becomes one that vibrates, or a slow and a fast one.
 
     Args:
-        names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
+        names: of every mode, in the order of the undamped frequencies of the shapes.
         values: λ, 1/s.
         energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
         sure: of which modes round-off leaves the sign of λ and of x^H K x. It does not at a hinge without a spring.
     """
     mass, stiffness = (np.real(e) for e in energies)
     over = (values.imag == 0.0) & (mass > 0.0) & (~sure | ((values.real < 0.0) & (stiffness > 0.0)))
-    if not np.any(over):
-        return names
-    vibrating, out = Counter[str](), list(names)
-    counted: dict[str, Counter[str]] = {"slow": Counter(), "fast": Counter()}
+    counted, out = Counter[tuple[str, str]](), list(names)
     for j, name in enumerate(names):
-        kind, _, _ = name.rpartition(" ")
-        if not over[j]:
-            vibrating[kind] += 1
-            continue
-        speed = "slow" if abs(values[j]) ** 2 * mass[j] < abs(stiffness[j]) else "fast"
-        counted[speed][kind] += 1
-        out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
+        slow = abs(values[j]) ** 2 * mass[j] < abs(stiffness[j])
+        rest = ("slow" if slow else "fast") if over[j] else ""
+        counted[name.kind, rest] += 1
+        if over[j]:
+            number = counted[name.kind, ""] + counted[name.kind, rest]
+            out[j] = ModeName(name.kind, number, rest=rest)
     return out
 
 
-def distinct(names: list[str]) -> list[str]:
-    """Return the names; those that occur more than once with a letter each."""
+def distinct(names: list[ModeName]) -> list[str]:
+    """Return the names in words; those that occur more than once with a letter each."""
     letters = [ascii_lowercase[names[:i].count(n) % 26] for i, n in enumerate(names)]
-    return [n if names.count(n) == 1 else f"{n}{letter}" for n, letter in zip(names, letters, strict=True)]
+    several = (n if names.count(n) == 1 else n._replace(letter=a) for n, a in zip(names, letters, strict=True))
+    return [str(n) for n in several]
 
 
-def with_whirl(names: list[str], waves: Sequence[Wave], omega: npt.NDArray[Any], speed: float) -> list[str]:
+def with_whirl(names: list[ModeName], waves: Sequence[Wave], omega: npt.NDArray[Any], speed: float) -> list[ModeName]:
     """Return the names of a rotor's modes with the direction they run in, and those of whirl by their place.
 
     The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
-    those of its direction, by the frequency in the fixed frame: "bending 2 backward".
+    those of its direction, by the frequency in the fixed frame: "2nd backward whirl". Shafts that do not whirl bend,
+    neither flapwise nor edgewise.
 
     Args:
-        names: "kind n" of every mode.
+        names: of every mode.
         waves: their precession.
         omega: their frequencies in the rotor, rad/s.
         speed: Ω ≥ 0, rad/s.
     """
     ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
-    out = [f"{name} {way}".rstrip() for name, way in zip(names, ways, strict=True)]
+    out = [name._replace(rest=way or name.rest) for name, way in zip(names, ways, strict=True)]
+    for j, wave in enumerate(waves):
+        if wave.shaft:
+            words = ("bending" if word in WORDS.values() else word for word in out[j].kind.split("–"))
+            out[j] = out[j]._replace(kind="–".join(dict.fromkeys(words)))
     for way in ("forward", "backward"):
         same = [j for j, wave in enumerate(waves) if wave.shaft and ways[j] == way]
         same.sort(key=lambda j: abs(waves[j].seen_fixed(float(omega[j]), speed)))
         for place, j in enumerate(same, start=1):
-            out[j] = f"bending {place} {way}"
+            out[j] = ModeName(f"{way} whirl", place)
     return out

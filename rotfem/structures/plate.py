@@ -27,7 +27,7 @@ from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
-from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
+from rotfem.structures.mode_names import ModeName, Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.section_fields import field_values
@@ -37,7 +37,7 @@ from rotfem.structures.structure import Array, PointValues, Structure, check_mem
 def plate_points(plate: Structure) -> Points:
     """Return the points of masses and loads of a plate."""
     masses = [row[:2] for row in plate.data.point_masses]
-    applied = [point.x for point in plate.point_loads]
+    applied = list(plate.problem.loads.places)
     points = Points(plate.mesh, [*masses, *applied])
     missing = points.missing
     if missing is None:
@@ -388,8 +388,8 @@ class Plate(Structure):
         x, cell = self._points, 1e-7 * self.length  # closer nodes share a coordinate
         return np.asarray(np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell))))
 
-    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
-        """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
+        """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:

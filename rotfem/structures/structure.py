@@ -16,14 +16,13 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
-from rotfem.mechanics.loads import AnyLoad, PlaceLoad, PointLoads, is_moment
+from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain, Support
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
-from rotfem.structures.applied_loads import Amplitude, SpanField, first
-from rotfem.structures.mode_names import Wave
-from rotfem.structures.points import Points, locate
+from rotfem.structures.applied_loads import Loaded
+from rotfem.structures.mode_names import ModeName, Wave
+from rotfem.structures.points import locate
 from rotfem.structures.reference_rotation import Turns
 
 Array = npt.NDArray[np.float64]
@@ -102,7 +101,7 @@ class PointValues:
         return out
 
 
-class Structure:
+class Structure(Loaded):
     """A discretised structure: blocked Lagrange functions on a mesh, clamped somewhere.
 
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
@@ -115,14 +114,10 @@ class Structure:
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
         points: where loads or masses are at a point.
-        load_constants: name of a load ↦ its amplitude in the forms.
     """
 
     type: ClassVar[str]
     planar: ClassVar[bool] = False
-    #: Components of a force, and of a moment.
-    dimension: ClassVar[int] = 3
-    turns_in: ClassVar[int] = 3
     #: Places along it (m) of rows of tables that are no nodes.
     inner_rows: Array = np.empty(0)
     #: Names of the unknowns.
@@ -140,10 +135,7 @@ class Structure:
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
     stiff: ClassVar[tuple[str, ...]] = ()
 
-    dx: Any
     dx_elastic: Any
-    tip: Any
-    points: Points
     root: Any
     clamped: npt.NDArray[np.int32]
     tip_values: PointValues
@@ -152,7 +144,8 @@ class Structure:
     radius: float = 0.0
 
     def __init__(self, problem: Problem, comm: MPI.Comm):
-        self.problem, self.comm, self.data = problem, comm, problem.structure
+        super().__init__(problem)
+        self.comm, self.data = comm, problem.structure
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
         self.size = len(self.active)
@@ -160,7 +153,6 @@ class Structure:
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
         self.scalars: dict[str, fem.Constant] = {}
-        self.load_constants: dict[str, Amplitude] = {}
         #: What finite rotations are counted from; None where they have no limit, or the theory none of large size.
         self.turns: Turns | None = None
 
@@ -289,18 +281,6 @@ class Structure:
         """Return all mass that is always there or that one of these effects brings, which it then names."""
         raise NotImplementedError
 
-    def position(self, q: Any) -> Any:
-        """Return the axis or mid-surface r(q), frame components (m)."""
-        raise NotImplementedError
-
-    def turned(self, q: Any, v: Any) -> Any:
-        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
-        raise NotImplementedError
-
-    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
-        """Return the work of a moment m (components of its amplitude) on the rotations."""
-        raise NotImplementedError
-
     # --- constants and fields -----------------------------------------------------------------------------------
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
@@ -310,64 +290,6 @@ class Structure:
     def scalar(self, name: str, value: float) -> fem.Constant:
         """Return the constant of a named number, one and the same at every call."""
         return self.scalars.setdefault(name, self.constant(value))
-
-    # --- loads ------------------------------------------------------------------------------------------------------
-
-    def place(self, point: Array) -> Any:
-        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
-        return float(point[0])
-
-    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
-        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
-        raise NotImplementedError
-
-    @property
-    def point_loads(self) -> tuple[PointLoads, ...]:
-        """What works at points of the structure."""
-        return self.problem.loads.at
-
-    def loads(self) -> list[AppliedLoad]:
-        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction."""
-        given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
-        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
-
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
-        """Return the work of one load."""
-        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
-        if is_moment(name):
-            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
-        f = self.amplitude(name, load, self.dimension)
-        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
-        force = self.spread(name, vector if dead else self.turned(q, vector))
-        return [AppliedLoad(name, force, self.position(q), measure, dead)]
-
-    def _measure(self, name: str) -> Any:
-        """Return what a load works on: the tip, a point, or the whole structure."""
-        if name.startswith("at."):
-            return self.points.measure(self.point_loads[int(name.split(".")[1])].x)
-        return self.tip if name.startswith("tip") else self.dx
-
-    def spread(self, name: str, load: Any) -> Any:
-        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
-        return load
-
-    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
-        """Return a load in the forms, its first `size` components, and remember its amplitude."""
-        made: Amplitude
-        if isinstance(load, PlaceLoad):
-            made = SpanField.of_place(self, load, size)
-        elif load.is_uniform:
-            made = Amplitude(self.constant(np.zeros(size)), lambda t: first(load.at(t), size))
-        else:
-            made = SpanField.of_shapes(self, load, size)
-        made.dead = load.kind == "dead"
-        self.load_constants[name] = made
-        return made.vector
-
-    def update_loads(self, turn: Array | None = None) -> None:
-        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead loads."""
-        for amplitude in self.load_constants.values():
-            amplitude.update(turn if amplitude.dead else None)
 
     # --- damping ------------------------------------------------------------------------------------------------
 
@@ -410,8 +332,8 @@ class Structure:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
 
-    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
-        """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
+        """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:

@@ -35,7 +35,7 @@ def test_compare_ends_with_status_1_beyond_the_tolerance(folder: Path, rotfem: R
     assert {path.name for path in (folder / "out").iterdir()} == {"compare.csv", "compare.png", "summary.json"}
     shown = rotfem("compare", "fine", "coarse", "-o", "out", "--tolerance", "1")
     assert shown.status == 0, shown.err
-    assert "lag 1" in shown.out
+    assert "1st edgewise" in shown.out
     assert max(map(len, shown.out.splitlines())) <= 80
 
 

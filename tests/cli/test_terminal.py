@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import fcntl
-import json
 import os
 import re
 import signal
-import struct
 import subprocess
 import sys
-import termios
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
+from rotfem.commands.cli import app
 from tests import blade_decks
 from tests.launch import environment
 
@@ -111,50 +110,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-#: Runs one command after another, given as JSON in the lines of a pipe, and writes its exit status behind each.
-SERVER = """
-import json, sys
-sys.modules["rich"] = None  # as in rotfem.__main__
-import typer
-del sys.modules["rich"]
-from rotfem.commands.cli import app
-for line in open(int(sys.argv.pop())):
-    status = 0
-    try:
-        app(json.loads(line), prog_name="rotfem")
-    except SystemExit as end:
-        status = int(end.code or 0)
-    print(f"\\0{status}\\0", end="", flush=True)
-"""
-
-
-def started(
-    folder: Path, *command: str, keep: tuple[int, ...] = (), **more: str
-) -> tuple[subprocess.Popen[bytes], int]:
-    """Return Python with a command in a folder at a terminal, and our end of that."""
-    ours, theirs = os.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, COLUMNS, 0, 0))
-    process = subprocess.Popen(
-        [sys.executable, *command],
-        cwd=folder,
-        env=environment() | {"TERM": "xterm-256color", "COLUMNS": "", "LINES": "", **more},
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
-        pass_fds=keep,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
-    os.close(theirs)
-    return process, ours
-
-
 @pytest.fixture(scope="module")
 def alone(folder: Path) -> Terminal:
     """Return a function that runs `rotfem …` there as a process; `stop` ends it with SIGINT at a text."""
 
     def run(*arguments: str, stop: str = "", **more: str) -> Shown:
         began, text, parts = time.monotonic(), "", []
-        process, ours = started(folder, "-m", "rotfem", *arguments, **more)
+        ours, theirs = os.openpty()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rotfem", *arguments],
+            cwd=folder,
+            env=environment() | {"TERM": "xterm-256color", "COLUMNS": str(COLUMNS), **more},
+            stdin=theirs,
+            stdout=theirs,
+            stderr=theirs,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )
+        os.close(theirs)
         while data := _read(ours):
             text += data
             parts.append((time.monotonic() - began, data))
@@ -167,25 +139,26 @@ def alone(folder: Path) -> Terminal:
     return run
 
 
-@pytest.fixture(scope="module")
-def terminal(folder: Path) -> Iterator[Terminal]:
-    """Yield a function that runs `rotfem …` there, all in one process at a terminal."""
-    reading, writing = os.pipe()
-    process, ours = started(folder, "-c", SERVER, str(reading), keep=(reading,))
-    os.close(reading)
+@pytest.fixture
+def terminal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Return a function that runs `rotfem …` there in this process, at a terminal."""
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", str(COLUMNS))
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.chdir(folder)
 
     def run(*arguments: str) -> Shown:
-        os.write(writing, json.dumps(arguments).encode() + b"\n")
-        text = ""
-        while not text.endswith("\0") and (data := _read(ours)):
-            text += data
-        text, status, _ = text.split("\0")
-        return Shown(text, [], int(status))
+        ours, theirs = os.openpty()
+        with ThreadPoolExecutor() as pool:
+            reader = pool.submit(lambda: "".join(iter(lambda: _read(ours), "")))
+            screen = open(theirs, "w", encoding="utf-8")  # noqa: SIM115
+            with screen, redirect_stdout(screen), redirect_stderr(screen), pytest.raises(SystemExit) as end:
+                app(list(arguments), prog_name="rotfem")
+            text = reader.result()
+        os.close(ours)
+        return Shown(text, [], int(end.value.code or 0))
 
-    yield run
-    os.close(writing)
-    process.wait(60)
-    os.close(ours)
+    return run
 
 
 def _read(descriptor: int) -> str:
@@ -210,8 +183,8 @@ def test_what_a_verb_prints(name: str, terminal: Terminal, folder: Path) -> None
 
 
 @pytest.mark.parametrize("verb", HELPS)
-def test_help(verb: str, alone: Terminal, terminal: Terminal) -> None:
-    shown = (alone if verb == "run" else terminal)(*verb.split(), "--help")
+def test_help(verb: str, alone: Terminal) -> None:
+    shown = alone(*verb.split(), "--help")
     assert shown.status == 0
     assert "Usage: rotfem" in shown.text
     assert "\\[" not in shown.text
@@ -229,15 +202,6 @@ def test_speeds_in_rpm_are_answered_in_rpm(terminal: Terminal) -> None:
     fast = terminal("run", "arm.toml", "--set", "model.theory=linear", "--set", "motion.speed=80 rpm", "-o", "out-fast")
     said = " ".join(CONTROL.sub("", fast.text).split())
     assert "stiffness at 3.8 rad/s (36.3 rpm); the scene reaches 8.38 rad/s (80 rpm)" in said
-
-
-def test_comparing(terminal: Terminal) -> None:
-    for folder, elements in (("coarse", "2"), ("fine", "4")):
-        assert terminal("modes", "blade.toml", "-q", "--set", f"mesh.elements={elements}", "-o", folder).text == ""
-    shown = terminal("compare", "coarse", "fine", "-o", "compared")
-    assert shown.status == 0
-    assert "difference (%)" in shown.text
-    assert [line for line in shown.lines if len(line) > COLUMNS] == []
 
 
 def test_no_colour(terminal: Terminal, alone: Terminal) -> None:

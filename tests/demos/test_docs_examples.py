@@ -90,9 +90,9 @@ def test_every_example_is_run() -> None:
 @pytest.mark.parametrize(
     ("said", "printed", "right"),
     [
-        ("['lag 1'] 8.904…", "['lag 1'] 8.9041621", True),
-        ("['lag 1'] 8.904…", "['lag 1'] 8.9061", False),
-        ("['lag 1'] 8.904…", "['lag 2'] 8.9041", False),
+        ("['1st edgewise'] 8.904…", "['1st edgewise'] 8.9041621", True),
+        ("['1st edgewise'] 8.904…", "['1st edgewise'] 8.9061", False),
+        ("['1st edgewise'] 8.904…", "['2nd edgewise'] 8.9041", False),
         ("[ 1.25… 2.5…]", "[1.2501  2.4999 ]", True),
         ("[1.25… 2.5…]", "[1.2501  2.4999 3.0]", False),
         ("[3.43… … 9.15…]", "[3.436 5.0 7.2 9.154]", True),

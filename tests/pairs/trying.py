@@ -123,7 +123,7 @@ def answers(columns: Mapping[str, Any]) -> dict[str, Any]:
     def counts(name: str) -> bool:
         table, _, column = name.partition(".")
         is_answer = column.startswith(("frequency", "damping", "growth", "speed", "tip", "root"))
-        return table == "history" or (table == "rows" and is_answer and not column.endswith(("_phase", "_modal")))
+        return table == "history" or (table == "rows" and is_answer and not column.endswith("_phase"))
 
     return {name: values for name, values in columns.items() if counts(name)}
 

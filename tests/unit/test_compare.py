@@ -28,10 +28,13 @@ def history(name: str, n: int, end: float, size: float = 1.0) -> RunResult:
     return RunResult(summary("run", name, kind="history"), {"t": t, "psi_dot": 0.0 * t, **tip})
 
 
+NAMES = ("0th edgewise", "1st edgewise", "2nd edgewise", "3rd edgewise")
+
+
 def modes(name: str, numbers: tuple[int, ...], factor: float = 1.0, nodes: Any = X) -> ModesResult:
     """Sine modes of these numbers, of frequency n² times a factor."""
     rows = [
-        {"mode": i, "label": f"lag {n}", "frequency": factor * n**2, "frequency_hz": 0.0}
+        {"mode": i, "label": NAMES[n], "frequency": factor * n**2, "frequency_hz": 0.0}
         for i, n in enumerate(numbers, start=1)
     ]
     shapes = {
@@ -79,8 +82,8 @@ def test_distance_of_responses_counts_the_phase() -> None:
 
     def of(name: str, turn: float) -> ResponseResult:
         values = np.exp(1j * turn) * np.ones((5, 1))
-        rows = [{"frequency": float(w), "tip_u2": 1.0, "tip_u2_phase": turn, "tip_u2_modal": 1.0} for w in omega]
-        return ResponseResult(summary("response", name, outputs=["tip_u2"], speed=0.0), rows, values, values)
+        rows = [{"frequency": float(w), "tip_u2": 1.0, "tip_u2_phase": turn} for w in omega]
+        return ResponseResult(summary("response", name, outputs=["tip_u2"], speed=0.0), rows, values)
 
     (row,) = compare(of("a", 0.0), of("b", 0.1)).rows
     assert row["difference"] == pytest.approx(2 * np.sin(0.05))  # |e^{0.1 i} − 1|
@@ -92,7 +95,7 @@ def test_modes_are_matched_by_their_shapes() -> None:
     other = modes("b", (3, 1, 2), 1.1, np.linspace(0.0, 1.0, 81))
     found = {row["quantity"]: row for row in compare(modes("a", (1, 2, 3)), other).rows}
     for n in (1, 2, 3):
-        row = found[f"lag {n}"]
+        row = found[NAMES[n]]
         assert row["difference"] == pytest.approx(0.1)
         assert row["mac"] == pytest.approx(1.0, abs=1e-9)
 
@@ -106,8 +109,8 @@ def test_modes_without_a_common_component_are_matched_by_frequency() -> None:
 
 
 def test_branches_are_matched_by_name_then_by_frequency() -> None:
-    b = campbell("b", ("lag 1", "edge 2", "axial 1"), 1.05, last=8.0)
-    result = compare(campbell("a", ("lag 1", "lag 2", "axial 1"), 1.0), b)
+    b = campbell("b", ("1st edgewise", "edge 2", "1st axial"), 1.05, last=8.0)
+    result = compare(campbell("a", ("1st edgewise", "2nd edgewise", "1st axial"), 1.0), b)
     for row in result.rows:
         assert row["difference"] == pytest.approx(0.05, rel=1e-2), row
     assert len(result.rows) == 3 + 2  # the critical speeds are among them
@@ -129,10 +132,10 @@ def test_a_rigid_body_has_no_partner_of_another_kind() -> None:
     free.shapes.pop("mode 1")
     for pair in ((free, held), (held, free)):
         result = compare(*pair)
-        assert [row["quantity"] for row in result.rows] == ["lag 1", "lag 2"]
+        assert [row["quantity"] for row in result.rows] == ["1st edgewise", "2nd edgewise"]
         assert result.summary["worst"] == 0.0
         (said,) = result.warnings
-        assert said.endswith(("rigid body, lag 3", "lag 3, rigid body"))
+        assert said.endswith(("rigid body, 3rd edgewise", "3rd edgewise, rigid body"))
 
 
 def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
@@ -156,7 +159,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
     [
         (history("a", 401, 10.0), history("b", 297, 7.0, 1.01)),
         (modes("a", (1, 2, 3)), modes("b", (3, 1, 2), 1.1)),
-        (campbell("a", ("lag 1", "lag 2"), 1.0), campbell("b", ("lag 1", "lag 2"), 1.1)),
+        (campbell("a", ("1st edgewise", "2nd edgewise"), 1.0), campbell("b", ("1st edgewise", "2nd edgewise"), 1.1)),
     ],
     ids=["run", "modes", "campbell"],
 )

@@ -1,30 +1,36 @@
-"""What a reader of a figure needs: no text over another or cut off, units on axes, data inside, legends outside.
-
-Judged on the figure as Matplotlib lays it out, of results made by hand.
-"""
+"""What a reader of a figure needs: units on axes, data inside, nothing cut off, what is 0 or too long said."""
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
 from matplotlib.contour import ContourSet
 from matplotlib.tri import Triangulation
 
-from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, RunResult
+from rotfem.results import CampbellResult, CheckResult, ModesResult, RunResult
 from rotfem.results.modes import ResponseResult
 from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.run import StationHistory
 from rotfem.section_quantities import FORCES, STRAINS
 from tests.figures import check
-from tests.unit.test_result_classes import cost
+from tests.unit.test_result_classes import ALL
+
+ZERO = "0 (below 1e-9 of the largest of the unit): "
 
 
 def said(**more: Any) -> dict[str, Any]:
     return {"name": "blade", "theory": "reissner", "status": "done", "warnings": [], **more}
+
+
+def titles(figure: Any) -> list[str]:
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+@ALL
+def test_every_result_has_a_figure_that_can_be_read(make: Any) -> None:
+    check(make().plot())
 
 
 # --- Campbell diagrams ------------------------------------------------------------------------------------------------
@@ -44,21 +50,28 @@ def diagram(frequencies: dict[str, float], damping: float = 0.0, **more: Any) ->
         for k in more.get("orders", [1, 2, 3, 4]):
             if k**2 > 1.3 and (speed := at_rest / np.sqrt(k**2 - 1.3)) < SPEEDS[-1]:
                 place = {"speed": speed, "kind": "per_rev", "order": k, "per_rev": k, "frequency": k * speed}
-                crossings.append({**place, "branch": branch, "label": name, "name": name})
-    branches = [{"branch": i, "label": name, "name": name} for i, name in enumerate(frequencies, start=1)]
+                crossings.append({**place, "branch": branch, "label": name})
+    branches = [{"branch": i, "label": name} for i, name in enumerate(frequencies, start=1)]
     found = {"critical_speeds": crossings, "instabilities": [], "ambiguous": [], "orders": [1, 2, 3, 4]}
     units = {"scene": {"output": {"speed": "rpm", "frequency": "Hz"}}}
     rows.sort(key=lambda row: row["speed"])
     return CampbellResult(said(branches=branches, **(found | units | more)), rows)
 
 
-@pytest.mark.parametrize("orders", [[1, 2, 3, 4], [1, 3, 6, 9], list(range(1, 16)), []])
+@pytest.mark.parametrize("orders", [[1, 2, 3, 4], list(range(1, 16)), []])
 @pytest.mark.parametrize("frequencies", [BLADE, BLADE | FURTHER])
 def test_a_campbell_diagram_can_be_read(frequencies: dict[str, float], orders: list[int]) -> None:
+    """What is marked is in the legend."""
+    marks = {"rated": 12.1 * np.pi / 30, "operating": [6.9 * np.pi / 30, 12.1 * np.pi / 30]}
     onsets = [{"speed": 1.5, "kind": "dynamic instability", "until": None}]
     doubts = [{"branch": 1, "speed": 1.0, "confidence": 0.3}]
-    marks = {"rated": 1.27, "operating": [0.7, 1.27], "instabilities": onsets, "ambiguous": doubts}
-    check(campbell_figure(diagram(frequencies, 0.01, orders=orders, **marks)))
+    figure = campbell_figure(diagram(frequencies, 0.01, orders=orders, instabilities=onsets, ambiguous=doubts, **marks))
+    check(figure)
+    assert figure.axes[1].get_ylabel() == "damping ratio (%)"
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:2] == ["operating range, 6.9 to 12.1 rpm", "rated speed, 12.1 rpm"]
+    assert texts[-1] == "ambiguous"
+    assert len(campbell_figure(diagram(frequencies, 1e-10)).axes) == 1, "round-off is no damping"
 
 
 def test_the_limit_follows_the_modes_that_lines_meet() -> None:
@@ -68,42 +81,15 @@ def test_the_limit_follows_the_modes_that_lines_meet() -> None:
     assert highest < axis.get_ylim()[1] < 1.1 * highest
     names = [text.get_text() for text in axis.texts]
     assert {"1st flapwise", "1st edgewise"} <= set(names)
-    assert "↑ 4 more" in names[-1] or any("↑ 4 more" in name for name in names)
-    assert any("↑ 2nd flapwise" in name for name in names)
+    assert any("↑ 4 more" in name and "↑ 2nd flapwise" in name for name in names)
     everything = campbell_figure(diagram(BLADE | FURTHER, orders=[])).axes[0]
     assert everything.get_ylim()[1] > 70.0 / (2 * np.pi)
 
 
-@pytest.mark.parametrize(("low", "high"), [(-2.0, 2.0), (-2.0, -0.5)])
-def test_speeds_of_both_senses(low: float, high: float) -> None:
-    result = diagram(BLADE, orders=[1, 3])
-    for row in result.rows:
-        row["speed"] = low + (high - low) * row["speed"] / 2.0
-    result.summary["critical_speeds"] = []
-    check(campbell_figure(result))
-
-
-def test_damping_has_a_panel_where_there_is_some() -> None:
-    assert len(campbell_figure(diagram(BLADE)).axes) == 1
-    assert len(campbell_figure(diagram(BLADE, 1e-10)).axes) == 1, "round-off is no damping"
-    damped = campbell_figure(diagram(BLADE, 0.02))
-    assert damped.axes[1].get_ylabel() == "damping ratio (%)"
-    np.testing.assert_allclose(damped.axes[1].get_lines()[-2].get_ydata(), 2.0)
-
-
-def test_what_is_marked_is_in_the_legend() -> None:
-    marks = {"rated": 12.1 * np.pi / 30, "operating": [6.9 * np.pi / 30, 12.1 * np.pi / 30]}
-    doubts = [{"branch": 1, "speed": 1.0, "confidence": 0.3}]
-    (legend,) = campbell_figure(diagram(BLADE, ambiguous=doubts, **marks)).legends
-    texts = [text.get_text() for text in legend.get_texts()]
-    assert texts == ["operating range, 6.9 to 12.1 rpm", "rated speed, 12.1 rpm", "crossing with kΩ", "ambiguous"]
-
-
 def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
-    """Its damping is that of the speeds that were solved, in one line."""
     result = diagram({"1st forward whirl": 1.0}, 0.02)
     place = {"speed": 0.9, "kind": "forward", "order": 1, "per_rev": 0, "frequency": 0.0, "branch": 1}
-    result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl", "name": "1st forward whirl"}]
+    result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl"}]
     frequency, damping = campbell_figure(result).axes
     lines = [line for line in frequency.get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
     assert np.min(lines[0].get_ydata()) == 0.0
@@ -112,7 +98,6 @@ def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
 
 def test_labels_are_spread_least() -> None:
     assert spread([5.0, 1.0, 1.0], 1.0, (0.0, 9.0)) == [5.0, 0.5, 1.5]
-    assert spread([3.0, 2.0], 0.5, (0.0, 9.0)) == [3.0, 2.0]
     assert spread([8.9, 9.0], 1.0, (0.0, 9.0)) == [8.0, 9.0], "labels stay within the limits"
     assert spread([1.0, 1.0, 1.0], 5.0, (0.0, 4.0)) == [0.0, 2.0, 4.0], "as far apart as there is room"
 
@@ -130,26 +115,20 @@ T = np.linspace(0.0, 100.0, 20001)
 
 def test_a_long_history_is_an_envelope() -> None:
     """800 periods of 8 Hz between ±1 and 0.1 t: their range in 250 stretches, none of the 20 001 points."""
-    result = run_of(T, tip_u2=np.sin(16 * np.pi * T), tip_u3=0.01 * np.sin(np.pi * T))
-    figure = result.plot()
-    check(figure)
+    figure = run_of(T, tip_u2=np.sin(16 * np.pi * T), tip_u3=0.01 * np.sin(np.pi * T)).plot()
     assert [len(line.get_xdata()) for axes in figure.axes for line in axes.get_lines()] == [250, 20001]
-    assert figure.axes[0].get_title(loc="left") == "tip u₂, range and mean of 800 periods"
-    (band,) = figure.axes[0].collections
-    extent = band.get_paths()[0].get_extents()
+    assert titles(figure)[0] == "tip u₂, range and mean of 800 periods"
+    extent = figure.axes[0].collections[0].get_paths()[0].get_extents()
     np.testing.assert_allclose([extent.y0, extent.y1], [-1.0, 1.0], atol=8e-3)  # 1 − cos(π/25), 25 points a period
 
 
 def test_what_is_zero_has_no_panel() -> None:
     """Round-off is 0, as stated; so is a speed that does not change."""
-    result = run_of(T, tip_u1=1e-16 * T, tip_u2=np.sin(T), tip_u3=2e-9 * np.sin(T), tip_theta1=0.0 * T)
-    figure = result.plot()
+    figure = run_of(T, tip_u1=1e-16 * T, tip_u2=np.sin(T), tip_u3=2e-9 * np.sin(T), tip_theta1=0.0 * T).plot()
     check(figure)
-    titles = [axes.get_title(loc="left") for axes in figure.axes]
-    assert titles == ["tip u₂", "tip u₃"]
-    suptitle = figure.get_suptitle()
-    assert suptitle.startswith("blade: reissner, rotating frame, 6 rad/s\n")
-    assert suptitle.endswith("0 (below 1e-9 of the largest of the unit): tip u₁, tip rotation θ₁")
+    assert titles(figure) == ["tip u₂", "tip u₃"]
+    title = "blade: reissner, rotating frame, 6 rad/s\n" + ZERO + "tip u₁, tip rotation θ₁"
+    assert figure.get_suptitle() == title
 
 
 def test_hub_and_root_are_drawn() -> None:
@@ -159,8 +138,7 @@ def test_hub_and_root_are_drawn() -> None:
     result = run_of(T, **tip, torque=np.cos(T), **roots)
     result.history["psi_dot"] = T
     assert list(result.drawings()) == ["history.png", "loads.png"]
-    titles = [axes.get_title(loc="left") for axes in result.plot().axes]
-    assert titles[6:] == ["speed Ω", "angle ψ", "torque on the hub"]
+    assert titles(result.plot())[6:] == ["speed Ω", "angle ψ", "torque on the hub"]
     for drawing in result.drawings():
         check(result.plot(drawing=drawing))
     assert len(result.plot(drawing="loads").axes) == 6
@@ -169,13 +147,20 @@ def test_hub_and_root_are_drawn() -> None:
     check(result.plot(drawing="loads"))
 
 
-def test_a_steady_state() -> None:
+def test_a_steady_state_and_one_in_which_nothing_moves() -> None:
     x = np.linspace(0.0, 2.0, 21)
+    history = {"t": np.zeros(1), "psi_dot": np.ones(1)}
     shape = {"x": x, "u1": 1e-5 * x, "u2": 0 * x, "u3": -(x**2), "theta2": 2 * x}
-    result = RunResult(said(kind="steady"), {"t": np.zeros(1), "psi_dot": np.ones(1)}, shape)
-    figure = result.plot()
+    figure = RunResult(said(kind="steady"), history, shape).plot()
     check(figure)
-    assert [axes.get_title(loc="left") for axes in figure.axes] == ["u₁", "u₃", "rotation θ₂"]
+    assert titles(figure) == ["u₁", "u₃", "rotation θ₂"]
+    still = RunResult(said(kind="steady"), history, {"x": x, "u1": 0 * x}).plot()
+    assert still.get_suptitle().endswith(ZERO + "u₁")
+    columns, triangles = nodes()
+    plate = RunResult(said(kind="steady"), {}, columns | {f"u{i}": 0 * columns["x"] for i in (1, 2, 3)}, triangles)
+    rows = [{"frequency": w} for w in (1.0, 2.0)]
+    for result in (plate, ResponseResult(said(outputs=["tip_u2"], speed=0.0), rows, np.zeros((2, 1)))):
+        check(result.plot())
 
 
 def test_section_forces_along_a_beam_with_their_range() -> None:
@@ -191,18 +176,6 @@ def test_section_forces_along_a_beam_with_their_range() -> None:
     np.testing.assert_allclose([extent.y0, extent.y1], [0.0, 11.0], atol=1e-9)
 
 
-def test_where_nothing_moves_the_figure_says_so() -> None:
-    x = np.linspace(0.0, 2.0, 5)
-    still = RunResult(said(kind="steady"), {"t": np.zeros(1), "psi_dot": np.zeros(1)}, {"x": x, "u1": 0 * x})
-    assert still.plot().get_suptitle().endswith("0 (below 1e-9 of the largest of the unit): u₁")
-    columns, triangles = nodes()
-    plate = RunResult(said(kind="steady"), {}, columns | {f"u{i}": 0 * columns["x"] for i in (1, 2, 3)}, triangles)
-    outputs, rows = ["tip_u2"], [{"frequency": w} for w in (1.0, 2.0)]
-    silent = ResponseResult(said(outputs=outputs, speed=0.0), rows, np.zeros((2, 1)), np.zeros((2, 1)))
-    for result in (still, plate, silent):
-        check(result.plot())
-
-
 # --- small motions ----------------------------------------------------------------------------------------------------
 
 
@@ -211,42 +184,31 @@ def test_modes_of_a_beam() -> None:
     shapes, rows = {}, []
     for i in range(1, 7):
         columns = {"x": x, "u1": 0 * x, "u2": np.sin(i * x), "u3": 0.3 * x, "theta1": 0.1 * x, "theta2": 5 * x}
-        shapes[f"mode {i}: flap {i}"] = columns | {f"{n}_imag": 0.01 * v for n, v in columns.items() if n != "x"}
-        rows.append({"mode": i, "label": f"flap {i}", "name": f"{i}th flapwise", "frequency": 3.0 * i})
+        shapes[f"mode {i}: {i}th flapwise"] = columns | {f"{n}_imag": 0.01 * v for n, v in columns.items() if n != "x"}
+        rows.append({"mode": i, "label": f"{i}th flapwise", "frequency": 3.0 * i})
     figure = ModesResult(said(speed=1.0), rows, shapes).plot()
     check(figure)
-    assert figure.axes[1].get_title(loc="left") == "2  2th flapwise, 6 rad/s"
+    assert titles(figure)[1] == "2  2th flapwise, 6 rad/s"
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["u₂", "u₃", "twist θ₁ × length"]
 
 
-def test_a_response() -> None:
-    """Two resonances; the outputs of a kind share a row, what does not answer is named, a legend stands outside."""
-    omega = np.linspace(0.1, 30.0, 400)
+@pytest.mark.parametrize("omega", [np.linspace(0.1, 30.0, 400), np.array([3.0])])
+def test_a_response(omega: Any) -> None:
+    """Two resonances; outputs of a kind share a row, what does not answer is named; a single frequency is a point."""
     one = 1 / (25 - omega**2 + 0.1j * omega) + 0.2 / (400 - omega**2 + 0.4j * omega)
     outputs = ["tip_u1", "tip_u2", "tip_u3", "tip_theta1", "root_f1", "root_f2", "root_m3", "M3@1.5"]
     direct = np.column_stack([1e-14 * one, one, 0.3 * one, one, 1e6 * one, one, one, one])
-    result = ResponseResult(said(outputs=outputs, speed=6.0), [{"frequency": w} for w in omega], direct, direct)
-    figure = result.plot()
+    figure = ResponseResult(said(outputs=outputs, speed=6.0), [{"frequency": w} for w in omega], direct).plot()
     check(figure)
     amplitudes = figure.axes[::2]
-    assert [len(axes.get_lines()) for axes in amplitudes] == [4, 2, 4, 2], "two lines an output: direct and by modes"
-    assert figure.get_suptitle().endswith("0 (below 1e-9 of the largest of the unit): tip u₁")
+    assert [len(axes.get_lines()) for axes in amplitudes] == [2, 1, 2, 1]
+    assert {line.get_marker() == "." for line in amplitudes[0].get_lines()} == {len(omega) == 1}
+    assert figure.get_suptitle().endswith(ZERO + "tip u₁")
     low, high = amplitudes[0].get_ylim()
     sizes = np.abs(direct[:, [1, 2]])
     assert high > sizes.max()
     assert np.all(np.mean(sizes < low, axis=0) < 0.05)
-
-
-def test_a_response_at_one_frequency() -> None:
-    """Points, in the middle of the axis."""
-    direct = np.array([[1.0 + 0.5j]])
-    result = ResponseResult(said(outputs=["tip_u2"], speed=6.0), [{"frequency": 3.0}], direct, direct)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure = result.plot()
-    check(figure)
-    assert [line.get_marker() for axes in figure.axes for line in axes.get_lines()] == [".", "None", "."]
 
 
 # --- plates -----------------------------------------------------------------------------------------------------------
@@ -258,7 +220,7 @@ def nodes(aspect: float = 0.5) -> tuple[dict[str, Any], Any]:
     return {"x": x, "y": y}, Triangulation(x, y).triangles
 
 
-def colours(axes: Axes) -> tuple[str, float, float]:
+def colours(axes: Any) -> tuple[str, float, float]:
     drawn = axes.collections[-1]
     return drawn.get_cmap().name, float(drawn.norm.vmin), float(drawn.norm.vmax)
 
@@ -271,7 +233,7 @@ def test_stresses_from_zero_in_one_hue_and_what_has_two_signs_about_zero() -> No
     result.resultants = columns | {"n11": -3.0 * x, "m11": x - 0.3, "m22": 1e-15 * y, "von_mises": 2e8 + 1e8 * y}
     figure = result.plot(drawing="resultants")
     check(figure)
-    assert figure.get_suptitle().endswith("0 (below 1e-9 of the largest of the unit): moment m₂₂")
+    assert figure.get_suptitle().endswith(ZERO + "moment m₂₂")
     found = {axes.get_title(): colours(axes) for axes in figure.axes if axes.get_title()}
     assert found == {
         "membrane force n₁₁": ("Blues_r", -3.0, 0.0),
@@ -280,8 +242,7 @@ def test_stresses_from_zero_in_one_hue_and_what_has_two_signs_about_zero() -> No
     }
 
 
-@pytest.mark.parametrize("count", [1, 3, 7])
-@pytest.mark.parametrize("aspect", [0.1, 1.0])
+@pytest.mark.parametrize(("count", "aspect"), [(1, 1.0), (3, 0.1), (7, 1.0)])
 def test_modes_of_a_plate(count: int, aspect: float) -> None:
     """One colour bar from −1 to 1 for all; no nodal line along the clamp."""
     columns, triangles = nodes(aspect)
@@ -289,8 +250,8 @@ def test_modes_of_a_plate(count: int, aspect: float) -> None:
     shapes, rows = {}, []
     for i in range(1, count + 1):
         w = np.sin(i * np.pi * x / 2) * (y - 0.5 * aspect) / aspect
-        shapes[f"mode {i}: torsion {i}"] = columns | {"u1": 0 * x, "u2": 0 * x, "u3": 2 * w}
-        rows.append({"mode": i, "label": f"torsion {i}", "name": f"{i}th torsion", "frequency": 3.0 * i})
+        shapes[f"mode {i}: {i}th torsion"] = columns | {"u1": 0 * x, "u2": 0 * x, "u3": 2 * w}
+        rows.append({"mode": i, "label": f"{i}th torsion", "frequency": 3.0 * i})
     result = ModesResult(said(speed=1.0), rows, shapes)
     result.triangles = triangles
     figure = result.plot()
@@ -299,10 +260,6 @@ def test_modes_of_a_plate(count: int, aspect: float) -> None:
     assert colours(figure.axes[0]) == ("RdBu_r", -1.0, 1.0)
     line = next(c for c in figure.axes[0].collections if isinstance(c, ContourSet)).get_paths()[0].vertices
     assert np.min(line[:, 0]) > 0.0, "the clamp is no nodal line"
-    np.testing.assert_allclose(line[:, 1], 0.5 * aspect, atol=0.1 * aspect)  # linear between nodes 0.2 apart
-
-
-# --- scenes -----------------------------------------------------------------------------------------------------------
 
 
 def test_properties_of_a_blade() -> None:
@@ -312,19 +269,4 @@ def test_properties_of_a_blade() -> None:
     columns |= {f"t{k}_{i}": np.full(13, float(k == i)) for k in (2, 3) for i in (1, 2, 3)}
     center = [20.0, 0.0, 2.0]
     result = CheckResult(said(mass=1e4, length=60.0, root=[0.0] * 3, center_of_mass=center), columns, {"x": x}, None)
-    figure = result.plot()
-    check(figure)
-    assert figure.axes[2].get_aspect() == 1.0, "sections seen along the axis are turned by their angles"
-
-
-def test_what_effects_change() -> None:
-    rows = [
-        {"kind": "effect", "name": "centrifugal", "included": True, "estimate": {"steady": 1.0, "modes": 0.02}},
-        {"kind": "effect", "name": "rotary_inertia", "included": False, "estimate": {"steady": None, "modes": 1e-5}},
-        {"kind": "theory", "name": "linear", "included": False, "estimate": {"steady": np.inf, "modes": 0.5}},
-    ]
-    check(ExplainResult(said(outputs=["steady", "modes"]), rows).plot())
-
-
-def test_costs() -> None:
-    check(cost().plot())
+    check(result.plot())

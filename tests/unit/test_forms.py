@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Any
 
-import ffcx.compiler
 import numpy as np
 import pytest
 import ufl
@@ -13,18 +11,13 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
-from ufl.argument import BaseArgument
-from ufl.coefficient import BaseCoefficient
-from ufl.utils.counted import Counted
 
-import rotfem
 from rotfem.commands.problem import Problem
 from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
-from rotfem.numerics import form_cache, forms, traversal
+from rotfem.numerics import forms
 from rotfem.numerics.forms import SAME, Assembler
-from tests.launch import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -69,21 +62,6 @@ def test_branches_that_vanish_leave_no_conditional(space: Any) -> None:
     assert forms.form(at_rest).rank == 2
 
 
-def test_forms_of_one_library_are_those_compiled_one_by_one(space: Any) -> None:
-    """A functional, a vector and a matrix, of the same function and of different constants."""
-    u, v, w = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
-    u.x.array[:] = np.arange(1.0, 1.0 + len(u.x.array))
-    c, d = (forms.constant(space.mesh, np.float64(x)) for x in (2.0, 3.0))
-    several = [c * ufl.dot(u, u) * ufl.dx, d * ufl.dot(u, v) * ufl.dx, c * d * ufl.dot(u, u) * ufl.dot(v, w) * ufl.dx]
-    apart, together = [forms.form(f) for f in several], forms.together(several)
-    for assemble in (
-        lambda f: fem.assemble_scalar(f[0]),
-        lambda f: fem.assemble_vector(f[1]).array,
-        lambda f: fem.assemble_matrix(f[2]).to_dense(),
-    ):
-        np.testing.assert_array_equal(assemble(together), assemble(apart))
-
-
 def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> None:
     """To the last bit, whatever the form; where a form has fewer couplings than the pattern its zeros are stored."""
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
@@ -111,43 +89,6 @@ def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
     for name, form in parts.items():
         assert found[name] == pytest.approx(fem.assemble_scalar(fem.form(form)), rel=1e-13)
     assert Functionals({}, space.mesh)() == {}
-
-
-def anew(name: str) -> Any:
-    """Return a module as it is without what `rotfem.numerics.traversal` puts into it."""
-    spec = importlib.util.find_spec(name)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_code_is_that_of_ffcx(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nodes found by their hash, and visited once, make the same code to the last letter."""
-    system = compile_system(Problem.of(rotfem.load_scene(ROOT / "demos" / "spin_up.toml")))
-
-    def code() -> Any:
-        return ffcx.compiler.compile_ufl_objects([system._residual_form, system._tangent_form], form_cache.OPTIONS)
-
-    here = code()
-    monkeypatch.setattr(ufl.corealg.map_dag, "map_expr_dags", anew("ufl.corealg.map_dag").map_expr_dags)
-    numbering = "ffcx.ir.analysis.valuenumbering"
-    real = anew(numbering).ValueNumberer.get_node_symbols
-    monkeypatch.setattr(f"{numbering}.ValueNumberer.get_node_symbols", real)
-    assert code() == here
-
-
-def test_terminals_and_signatures_are_those_of_ufl() -> None:
-    """Traversals done once find what UFL finds, which is loaded anew, without them."""
-    real = anew("ufl.algorithms.signature")
-    system = compile_system(Problem.of(rotfem.load_scene(ROOT / "demos" / "spin_up.toml")))
-    for form in (system._residual_form, system._tangent_form):
-        for classes in (ufl.Constant, (BaseArgument, BaseCoefficient), Counted, ufl.classes.SpatialCoordinate):
-            found = traversal.extract_type(form, classes)
-            assert found
-            assert found == traversal._extract_type(form, classes)
-        assert form.signature() == real.compute_form_signature(form, form._compute_renumbering())
 
 
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])

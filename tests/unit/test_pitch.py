@@ -12,7 +12,7 @@ from rotfem.analysis.time_grid import find_jumps
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
 from rotfem.mechanics.differentiation import Derivative
-from rotfem.mechanics.loads import ConstantLoad, Load, Loads, Shapes, Term
+from rotfem.mechanics.loads import Load, Loads, Shapes, Term
 from rotfem.mechanics.pitch import Pitch, differentiated, tabulated_pitch, turn_about
 from rotfem.mechanics.time_signals import TimeSignal
 from rotfem.scene import Scene
@@ -143,8 +143,8 @@ def test_dead_loads_keep_their_direction_in_the_hub() -> None:
     pitch = Pitch(lambda t: 0.2 + t, lambda t: 1.0, lambda t: 0.0, axis, np.zeros(3), start=0.2)
     shapes = Shapes.along_span([[0.0, 1.0, 2.0, 3.0], [4.0, -1.0, 0.5, 0.0]])
     given = Load("dead", (Term.table([[0, 1.0], [2, 3.0]], shapes),))
-    loads = Loads(distributed=given, tip_force=ConstantLoad((1.0, 2.0, 3.0))).pitched(pitch)
-    spread, same = loads.distributed, loads.tip_force
+    loads = Loads(named={"distributed": given, "tip_force": Load.of_components((1.0, 2.0, 3.0))}).pitched(pitch)
+    spread, same = loads.named["distributed"], loads.named["tip_force"]
     assert isinstance(spread, Load)
     assert isinstance(same, Load)
     x, t = np.array([1.0, 3.0]), 0.7

@@ -52,10 +52,10 @@ def modes(stability: str = "stable") -> ModesResult:
     """Return a rigid-body mode and two others, at 6 rad/s."""
     rows = [
         mode(1, "rigid body", 0.0, 0.0, stability="neutral", share_hub=1.0),
-        mode(2, "lag 1", 4.0, -3.0, stability="stable", share_hub=0.1),
-        mode(3, "lag 2", 12.0, 0.5, stability=stability, share_hub=0.2),
+        mode(2, "1st edgewise", 4.0, -3.0, stability="stable", share_hub=0.1),
+        mode(3, "2nd edgewise", 12.0, 0.5, stability=stability, share_hub=0.2),
     ]
-    shapes = {"mode 2: lag 1": shape(1.0), "mode 3: lag 2": shape(1j)}
+    shapes = {"mode 2: 1st edgewise": shape(1.0), "mode 3: 2nd edgewise": shape(1j)}
     return ModesResult(summary(command="modes", speed=6.0), rows, shapes)
 
 
@@ -64,8 +64,8 @@ def plate_modes() -> ModesResult:
     columns = {"x": np.array([0.0, 1.0, 0.0]), "y": np.array([0.0, 0.0, 1.0])}
     for name in ("u1", "u2", "u3"):
         columns |= {name: np.array([0.0, 0.0, float(name == "u3")]), f"{name}_imag": np.zeros(3)}
-    rows = [mode(1, "flap 1", 2.0, 0.0, stability="stable", turning=0.0)]
-    result = ModesResult(summary(command="modes", speed=0.0), rows, {"mode 1: flap 1": columns})
+    rows = [mode(1, "1st flapwise", 2.0, 0.0, stability="stable", turning=0.0)]
+    result = ModesResult(summary(command="modes", speed=0.0), rows, {"mode 1: 1st flapwise": columns})
     result.triangles = np.array([[0, 1, 2]])
     return result
 
@@ -76,16 +76,16 @@ def campbell() -> CampbellResult:
         {"speed": speed, "branch": branch, "label": name, "mode": name, "frequency": branch * (3.0 + speed)}
         | {"growth": 0.0, "damping": 0.0, "confidence": 1.0, "refined": int(speed == 5.0)}
         for speed in (0.0, 5.0, 10.0)
-        for branch, name in ((1, "lag 1"), (2, "axial 1"))
+        for branch, name in ((1, "1st edgewise"), (2, "1st axial"))
         if (speed, branch) != (10.0, 2)
     ]
     ends = {"confidence": 1.0, "frequency_first": 3.0, "frequency_last": 13.0}
-    branches = [{"branch": 1, "label": "lag 1", "name": "lag 1", **ends}]
-    branches.append({**ends, "branch": 2, "label": "axial 1", "name": "axial 1", "frequency_last": None})
+    branches = [{"branch": 1, "label": "1st edgewise", **ends}]
+    branches.append({**ends, "branch": 2, "label": "1st axial", "frequency_last": None})
     meets = {"speed": 3.0, "kind": "per_rev", "order": 2, "branch": 1, "per_rev": 2, "frequency": 6.0}
     said = summary(
         **{"command": "campbell", "branches": branches, "per_rev": 2, "orders": [1, 2], "ambiguous": []},
-        critical_speeds=[{**meets, "label": "lag 1", "name": "lag 1"}],
+        critical_speeds=[{**meets, "label": "1st edgewise"}],
         instabilities=[{"speed": 8.0, "kind": "dynamic instability", "until": None}],
     )
     return CampbellResult(said, rows)
@@ -148,13 +148,13 @@ def test_a_run_by_its_names() -> None:
     assert result.figures == FIGURES
     assert not result.steady
     assert history(kind="steady").steady
-    with pytest.raises(KeyError, match="no number 'tip_u3' in history; there are t, psi, psi_dot, tip_u1"):
+    with pytest.raises(KeyError, match="no number 'tip_u3' in the table; there are t, psi, psi_dot, tip_u1"):
         result.column("tip_u3")
 
 
 def test_modes_by_their_names() -> None:
     result = modes()
-    assert result.labels == ["rigid body", "lag 1", "lag 2"]
+    assert result.labels == ["rigid body", "1st edgewise", "2nd edgewise"]
     assert result.speed == 6.0
     np.testing.assert_array_equal(result.frequencies, [0.0, 4.0, 12.0])
     np.testing.assert_allclose(2 * np.pi * result.frequencies_hz, result.frequencies)
@@ -164,7 +164,7 @@ def test_modes_by_their_names() -> None:
     np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
     assert result.stable
     assert not modes("dynamic instability").stable
-    with pytest.raises(KeyError, match="no number 'label' in modes; there are mode, frequency"):
+    with pytest.raises(KeyError, match="no number 'label' in the table; there are mode, frequency"):
         result.column("label")
 
 
@@ -172,12 +172,12 @@ def test_branches_over_speed() -> None:
     result = campbell()
     np.testing.assert_array_equal(result.speeds, [0.0, 5.0, 10.0])
     np.testing.assert_array_equal(result.refined, [False, True, False])
-    assert result.labels == ["lag 1", "axial 1"]
+    assert result.labels == ["1st edgewise", "1st axial"]
     np.testing.assert_array_equal(result.frequencies, [[3.0, 6.0], [8.0, 16.0], [13.0, np.nan]])
     assert result.growth.shape == result.damping.shape == (3, 2)
-    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "lag 1", "lag 1")]
+    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "1st edgewise")]
     assert result.instabilities == [Instability(8.0, "dynamic instability", None)]
-    np.testing.assert_array_equal(result.branches()["axial 1"]["frequency"], [6.0, 16.0])
+    np.testing.assert_array_equal(result.branches()["1st axial"]["frequency"], [6.0, 16.0])
 
 
 def test_changes_of_effects_and_front_of_a_study() -> None:
@@ -208,10 +208,10 @@ def test_tables_of_pandas() -> None:
     run = history().to_pandas()
     assert run.index.name == "t"
     assert run.loc[0.5, "tip_u1"] == -0.25
-    assert modes().to_pandas().loc[3, "label"] == "lag 2"
+    assert modes().to_pandas().loc[3, "label"] == "2nd edgewise"
     table = campbell().to_pandas()
-    assert table.loc[(5.0, "axial 1"), "frequency"] == 16.0
-    assert list(table["frequency"].unstack("label")["lag 1"]) == [3.0, 8.0, 13.0]
+    assert table.loc[(5.0, "1st axial"), "frequency"] == 16.0
+    assert list(table["frequency"].unstack("label")["1st edgewise"]) == [3.0, 8.0, 13.0]
     rows = explained().to_pandas()
     assert rows.loc["coriolis", "truth_modes"] == 0.021
     assert np.isnan(rows.loc["linear", "truth_modes"])
@@ -233,11 +233,11 @@ def test_labelled_arrays(tmp_path: Path) -> None:
         "rad/s",
         6,
     )
-    assert list(shapes["label"].values) == ["rigid body", "lag 1", "lag 2"]
+    assert list(shapes["label"].values) == ["rigid body", "1st edgewise", "2nd edgewise"]
     np.testing.assert_array_equal(plate_modes().to_xarray()["triangles"].values, [[0, 1, 2]])
     branches = campbell().to_xarray()
-    assert float(branches["frequency"].sel(speed=5.0, label="axial 1")) == 16.0
-    assert np.isnan(branches["frequency"].sel(speed=10.0, label="axial 1"))
+    assert float(branches["frequency"].sel(speed=5.0, label="1st axial")) == 16.0
+    assert np.isnan(branches["frequency"].sel(speed=10.0, label="1st axial"))
     study = cost().to_xarray()
     assert study["time"].attrs["units"] == "s"
     study.to_netcdf(tmp_path / "cost.nc")

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotfem.errors import OutputError
-from rotfem.results.files import csv_text, json_text, read_csv, whole_hdf5, write_text
+from rotfem.results.files import csv_text, json_text, read_csv, write_text
 from rotfem.results.run import RunResult, Table
 from rotfem.version import __version__
 
@@ -66,21 +65,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
         write_text(path, "new")
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["summary.json"]
-
-
-def test_hdf5_that_there_is_no_room_for(tmp_path: Path) -> None:
-    """HDF5 would leave a part of the file, and crash with Python's end."""
-    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limit[1]))
-    try:
-        with pytest.raises(OutputError, match=r"fields.h5.*File too large"), whole_hdf5(tmp_path / "fields.h5") as file:
-            file["values"] = np.ones(1000)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
-    assert os.listdir(tmp_path) == []
-    with whole_hdf5(tmp_path / "fields.h5") as file:
-        file["values"] = np.ones(1000)
-    assert (tmp_path / "fields.h5").stat().st_size > 8000
 
 
 def test_files_get_the_usual_permissions(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -45,8 +44,8 @@ def test_representations_are_short() -> None:
         problem(),
         rotfem.Motion.from_table(many),
         rotfem.FreeHub(3.0, rotfem.Torque(pulses)),
-        rotfem.Loads(tip_force=rotfem.ConstantLoad([0.0, 1.0])),
-        rotfem.ConstantLoad([0.0, 1.0]),
+        rotfem.Loads(tip_force=[0.0, 1.0]),
+        problem().replace(loads=rotfem.Loads(tip_force=[0.0, 1.0])).loads,
         rotfem.GeneralisedAlpha(),
         next(iter(problem().march(end=0.1, step=0.1))),
     ]
@@ -54,26 +53,6 @@ def test_representations_are_short() -> None:
         assert len(repr(thing)) < 500, type(thing)
         assert len(str(thing)) < 500, type(thing)
     assert repr(problem().structure).startswith("PlanarBeamStructure(length=10.0, section=PlanarSection(EA=28000000.0")
-
-
-# --- signatures -------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["PlanarBeam", "SpatialBeam", "Plate", "BeamMesh", "PlateMesh"])
-def test_signatures_have_the_keys_and_types_that_a_script_gives(name: str) -> None:
-    table = getattr(rotfem, name)
-    parameters = inspect.signature(table).parameters
-    assert list(parameters) == list(table.model_fields)
-    assert all(p.kind is p.KEYWORD_ONLY for p in parameters.values())
-    assert "Validator" not in str(inspect.signature(table))
-    for key, field in table.model_fields.items():
-        assert (parameters[key].default is inspect.Parameter.empty) == field.is_required()
-
-
-def test_a_key_with_a_unit_may_be_a_text() -> None:
-    parameters = inspect.signature(rotfem.PlanarBeam).parameters
-    assert parameters["length"].annotation == float | str
-    assert inspect.signature(rotfem.BeamMesh).parameters["elements"].annotation is int
 
 
 # --- units ------------------------------------------------------------------------------------------------------------
@@ -87,7 +66,8 @@ def test_scripts_take_the_units_that_scenes_take() -> None:
     assert rotfem.Motion.spin_up("6 rad/s", "0.25 min").settled == 15.0
     assert rotfem.FreeHub("3000 kg*cm^2", speed="60 rpm").inertia == pytest.approx(0.3, rel=1e-14)
     assert rotfem.Loads(gravity=(0, 0, "-981 cm/s^2")).gravity[2] == pytest.approx(-9.81, rel=1e-15)
-    assert rotfem.ConstantLoad(["0 N", "2 kN"]).at(0.0)[1] == 2000.0
+    pushed = made.replace(loads=rotfem.Loads(tip_force={"over_time": [[0, 0, 0], ["1 s", 0, "2 kN"]]}))
+    assert pushed.loads.named["tip_force"].at(0.5)[1] == 1000.0
     assert made.modes(count=1, speed="60 rpm").speed == pytest.approx(6.283185307179586, rel=1e-15)
     assert [moment.t for moment in made.march(end="100 ms", step="0.1 s")] == [0.0, 0.1]
 
@@ -97,7 +77,7 @@ def test_scripts_take_the_units_that_scenes_take() -> None:
     [
         lambda: rotfem.PlanarBeam(length="3 kg", section=SECTION),
         lambda: rotfem.Motion.constant_speed("3 kg"),
-        lambda: rotfem.ConstantLoad(["3 kg"]),
+        lambda: rotfem.Loads(tip_force=["3 kg", 0]),
         lambda: rotfem.FreeHub("much"),
         lambda: problem().steady(speed="12 rpn"),
     ],

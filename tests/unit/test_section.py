@@ -111,51 +111,6 @@ def test_taper_end_tolerance() -> None:
         planar(EA=[[0, 1], [1.9, 1]], GA=2, EI=3, mass_per_length=4)
 
 
-@pytest.mark.parametrize(
-    ("taper", "message"),
-    [
-        ([[0, 1]], "at least two rows"),
-        ([], "at least two rows"),
-        ([[0.1, 1], [2, 1]], "must start at x = 0"),
-        ([[0, 1], [1, 1], [1, 2], [2, 2]], "increase strictly"),
-        ([[0, 1], [2, 0]], "greater than 0"),
-        ([[0, 1], [2, float("nan")]], "finite"),
-        ([[0, 1], [2, True]], "must be a number"),
-        ([[0, 1], [2]], "more entries than 1"),
-        ([[0, 1, 2], [2, 1, 2]], "at most 2 entries"),
-        ([0, 1], "must be a list"),
-    ],
-)
-def test_bad_tapers(taper: list[Any], message: str) -> None:
-    with pytest.raises(SceneError, match=message) as caught:
-        planar(EA=taper, GA=2, EI=3, mass_per_length=4)
-    assert caught.value.key.startswith("structure.section.EA")
-
-
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ({}, "none is given"),
-        ({"EA": 1, "GA": 1, "EI": 1}, "missing mass_per_length"),
-        ({"EA": 1, "GA": 1, "EI": 1, "mass_per_length": 1, "E": 1}, "E cannot be combined"),
-        ({**MATERIAL, "shape": "circle"}, "missing radius"),
-        ({**MATERIAL, "shape": "circle", "radius": 1, "wall": 1}, "wall cannot be combined"),
-        ({**MATERIAL, "shape": "tube", "outer_radius": 1, "inner_radius": 0.5, "wall": 0.5}, "cannot be combined"),
-        ({**MATERIAL, "shape": "tube", "outer_radius": 1, "inner_radius": 1}, "less than outer_radius"),
-        (
-            {**MATERIAL, "shape": "tube", "outer_radius": [[0, 2], [2, 1]], "inner_radius": 1.5},
-            "less than outer_radius",
-        ),
-        ({**MATERIAL, "nu": 0.6, "shape": "circle", "radius": 1}, "at most 0.5"),
-        ({**MATERIAL, "shape": "circel", "radius": 1}, 'did you mean "circle"'),
-    ],
-)
-def test_incomplete_and_mixed_sections(section: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError, match=message) as caught:
-        planar(**section)
-    assert caught.value.key.startswith("structure.section")
-
-
 def test_incomplete_section_lists_the_possible_sets() -> None:
     with pytest.raises(SceneError) as caught:
         planar(EA=1)

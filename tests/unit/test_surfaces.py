@@ -59,6 +59,6 @@ def test_a_plate_moves_as_its_nodes_do() -> None:
     surface = Surface.of_plate(points, np.array([[0, 1, 2]]), 1.0)
     shape = {"x": points[:, 0], "y": points[:, 1], "u3": np.array([0.0, 0.0, 1.0]), "alpha1": np.ones(3)}
     np.testing.assert_array_equal(surface.moved(shape), [[0, 0, 0], [0, 0, 0], [0, 0, 1]])
-    (one,) = surface.frames({"mode 1: bending 1": shape}, 2)
+    (one,) = surface.frames({"mode 1: 1st bending": shape}, 2)
     assert one[0] == 2.0
     assert set(one[1]) == {"displacement", "displacement_imag"}

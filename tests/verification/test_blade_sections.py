@@ -121,10 +121,10 @@ def test_principal_axes_turned_in_the_section() -> None:
     ("key", "value", "message"),
     [
         ("stiffness", [[0.0, np.eye(6)], [0.5, np.eye(6)]], "must run from x = 0 to the length 1; it ends at 0.5"),
-        ("stiffness", [[0.0, np.eye(6)], [1.0, np.eye(5)]], "row 2: must be a symmetric 6×6 matrix"),
-        ("stiffness", [[0.0, np.eye(6)], [1.0, -np.eye(6)]], "row 2: .*positive definite"),
+        ("stiffness", [[0.0, np.eye(6)], [1.0, np.eye(5)]], "at x = 1 it must be a symmetric 6×6 matrix"),
+        ("stiffness", [[0.0, np.eye(6)], [1.0, -np.eye(6)]], "at x = 1 it .*positive definite"),
         ("stiffness", [[0.5, np.eye(6)], [1.0, np.eye(6)]], "must start at x = 0"),
-        ("stiffness", [[0.0, np.eye(6)], [0.0, np.eye(6)]], "x must increase strictly; row 2"),
+        ("stiffness", [[0.0, np.eye(6)], [0.0, np.eye(6)]], "must increase strictly; row 2"),
         ("stiffness", [[0.0, np.eye(6)]], "at least two rows"),
         (
             "mass",

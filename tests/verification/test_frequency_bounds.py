@@ -60,7 +60,7 @@ def test_what_is_lost_is_said() -> None:
         assert np.max(result.column("error_bound")) < 1e-8
     lost = modes(viscous(1e-6))
     (warning,) = [text for text in lost.summary["warnings"] if text.startswith("unreliable")]
-    assert "lag 1" in warning
+    assert "1st edgewise" in warning
 
 
 def test_no_instability_out_of_round_off() -> None:

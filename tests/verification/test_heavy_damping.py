@@ -84,8 +84,8 @@ def test_proportional_damping(viscosity: float, theory: str) -> None:
 def test_overdamped_modes_are_named() -> None:
     """Each undamped mode is one row that vibrates, or a slow and a fast one with its number."""
     result = modes(beam(0.02, 1.0, 0.0, 9))
-    over = ["lag 4, slow", "lag 4, fast", "lag 5, slow", "lag 5, fast", "lag 6, slow", "lag 6, fast"]
-    assert result.labels == ["lag 1", "lag 2", "lag 3", *over]
+    over = [f"{n}th edgewise, {way}" for n in (4, 5, 6) for way in ("slow", "fast")]
+    assert result.labels == ["1st edgewise", "2nd edgewise", "3rd edgewise", *over]
     np.testing.assert_array_equal(result.frequencies[3:], 0.0)
     np.testing.assert_allclose(result.damping[3:], 1.0)
 
@@ -135,7 +135,7 @@ def test_campbell() -> None:
     """Branches of a heavily damped beam are followed over speed, and none is lost."""
     scene = beam(5e-3, 1.0, 6.0, 4, mesh={"elements": 4})
     result = campbell(scene, [0.0, 3.0, 6.0])
-    assert result.labels == [f"lag {n}" for n in range(1, 5)]
+    assert result.labels == ["1st edgewise", "2nd edgewise", "3rd edgewise", "4th edgewise"]
     assert np.all(np.isfinite(result.frequencies))
     single = modes(scene)
     np.testing.assert_allclose(result.frequencies[-1], single.frequencies, rtol=1e-8)
@@ -198,7 +198,7 @@ def test_a_damper_at_a_hinge_without_a_spring(damper: float, damping: dict[str, 
         scene = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
         result = modes({**scene, "model": {"theory": "linear"}, "mesh": {"elements": 3}, "output": {"error": False}})
         found.append([(row["label"], row["growth"], row["frequency"]) for row in result.rows])
-        assert result.rows[0]["label"] == "lag 1, slow"
+        assert result.rows[0]["label"] == "1st edgewise, slow"
         assert result.rows[0]["error_bound"] >= 1.0
     for other in found[1:]:
         assert [label for label, *_ in other] == [label for label, *_ in found[0]]

@@ -52,7 +52,7 @@ def test_coupled_frequency_in_the_thin_limit(ratio: float, exact: float) -> None
     rows = rotfem.modes(scene).rows
     assert rows[0]["label"] == "rigid body"
     assert rows[0]["frequency"] == 0.0
-    assert rows[1]["label"] == "lag 1"
+    assert rows[1]["label"] == "1st edgewise"
     assert rows[1]["frequency_hz"] == pytest.approx(exact, rel=1e-6)
 
 

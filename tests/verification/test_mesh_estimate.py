@@ -88,8 +88,8 @@ def test_every_mode_is_judged(more: dict[str, Any], motion: dict[str, Any]) -> N
     said = [line for line in true.warnings if line.startswith("unreliable")]
     assert said == (
         [
-            "unreliable: round-off leaves no digit of lag 1: nothing holds that motion, or axial or shear stiffness "
-            "outweighs what it feels"
+            "unreliable: round-off leaves no digit of 1st edgewise: nothing holds that motion, or axial or shear "
+            "stiffness outweighs what it feels"
         ]
         if "root" in more
         else []
@@ -108,8 +108,8 @@ def test_what_is_said() -> None:
     """A mesh that is too coarse for the modes wanted is said to be; the mesh that is taken without one is not."""
     few = result(BEAM, 2, 4)
     (warning,) = [text for text in few.summary["warnings"] if text.startswith("coarse")]
-    assert "lag 4" in warning
-    assert "lag 1" not in warning
+    assert "4th edgewise" in warning
+    assert "1st edgewise" not in warning
     assert result(BEAM, 16, 6).summary["warnings"] == []
     assert result(plate(2.0), [8, 8], 6).summary["warnings"] == []
     thin = result(plate(1.0), [2, 60], 5)

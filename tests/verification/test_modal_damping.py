@@ -90,12 +90,12 @@ def test_one_ratio_is_that_of_ten_modes() -> None:
 def test_families_are_counted_by_themselves() -> None:
     """A number is one ratio, and may be in per cent; a list has the axial mode where its frequency stands."""
     families = by_label(modes(beam({"lag": [0.01, 0.02], "axial": "4 %"}, **{"modes.count": 9})))
-    place = list(families).index("axial 1")
+    place = list(families).index("1st axial")
     listed = by_label(modes(beam([0.01, 0.02] + [0.0] * (place - 2) + [0.04], **{"modes.count": 9})))
     assert families.keys() == listed.keys()
     for label, ratio in families.items():
         assert ratio == pytest.approx(listed[label], abs=EXACT), label
-    assert families["axial 1"] == pytest.approx(0.04, abs=EXACT)
+    assert families["1st axial"] == pytest.approx(0.04, abs=EXACT)
 
 
 @pytest.mark.parametrize("EI3", [2.8e4, 1.4e4])
@@ -114,7 +114,7 @@ def test_plate() -> None:
     structure = PLATE | {"damping": {"modal": {"bending": [0.01, 0.02, 0.0, 0.03], "in-plane": [0.05]}}}
     tables = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "linear"}}
     found = by_label(modes(Scene.from_dict(tables | {"mesh": {"elements": [4, 2]}, "modes": {"count": 7}})))
-    expected = {"bending 1": 0.01, "torsion 1": 0.02, "torsion 2": 0.03, "in-plane 1": 0.05}
+    expected = {"1st bending": 0.01, "1st torsion": 0.02, "2nd torsion": 0.03, "1st in-plane": 0.05}
     for label, ratio in found.items():
         assert ratio == pytest.approx(expected.get(label, 0.0), abs=EXACT), label
 

@@ -154,7 +154,11 @@ def test_euler_bernoulli_limit(unit_beam: Any, theory: str, delta: float) -> Non
         spinning = analysis.at(eta, 3, spinning)
         expected = transverse(eta, delta)
         worst = max(worst, float(np.max(np.abs(spinning.pairs.values.imag[:3] / expected - 1))))
-        assert analysis.described(spinning).names[:3] == ["lag 1", "lag 2", "lag 3"]
+        assert [str(name) for name in analysis.described(spinning).names[:3]] == [
+            "1st edgewise",
+            "2nd edgewise",
+            "3rd edgewise",
+        ]
     print(f"A {theory} delta={delta:g}: {worst:.1e}")
     assert worst < 1e-5
 
@@ -298,7 +302,7 @@ def test_stiffening(hub_beam: Any) -> None:
     first = {}
     for theory in ("linear", "consistent_linear", "von_karman_linear", "reissner"):
         result = campbell(hub_beam({"model.theory": theory}), speeds, orders=0)
-        first[theory] = result.branches()["lag 1"]["frequency"]
+        first[theory] = result.branches()["1st edgewise"]["frequency"]
         assert len(first[theory]) == len(speeds)  # smooth: nothing refined
     assert np.all(np.diff(first["linear"]) < 0)
     assert first["linear"][-1] < 0.3 * first["linear"][0]
@@ -308,7 +312,7 @@ def test_stiffening(hub_beam: Any) -> None:
     beyond = modes(hub_beam({"model.theory": "linear", "motion": {"type": "constant", "speed": 4.0}}))
     assert beyond.rows[0]["stability"] == "static instability"
     assert beyond.rows[0]["growth"] == pytest.approx(2.743576669, rel=1e-6)  # iccia_frequencies.csv
-    assert any("static instability: lag 1 grows" in text for text in beyond.summary["warnings"])
+    assert any("static instability: 1st edgewise grows" in text for text in beyond.summary["warnings"])
 
 
 # --- theorems --------------------------------------------------------------------------------------------------------
@@ -411,9 +415,15 @@ def test_left_vectors(unit_beam: Any, theory: str, conservative: bool) -> None:
 
 
 def test_rows_and_names(unit_beam: Any) -> None:
-    """A beam at rest: lag 1 … with 0, 1, 2, … nodes, axial 1 at (pi/2) √(EA/A_rho) with all its energy in u1."""
+    """A beam at rest: edgewise with 0, 1, 2, … nodes, 1st axial at (pi/2) √(EA/A_rho) with all its energy in u1."""
     result = modes(unit_beam({"structure.section": section(1 / 30)}, modes={"count": 5}))
-    assert [row["label"] for row in result.rows] == ["lag 1", "lag 2", "axial 1", "lag 3", "lag 4"]
+    assert [row["label"] for row in result.rows] == [
+        "1st edgewise",
+        "2nd edgewise",
+        "1st axial",
+        "3rd edgewise",
+        "4th edgewise",
+    ]
     axial = result.rows[2]
     assert axial["frequency"] == pytest.approx(np.pi / 2 * 30, rel=1e-8)
     assert axial["frequency_hz"] == pytest.approx(7.5, rel=1e-8)
@@ -426,17 +436,17 @@ def test_rows_and_names(unit_beam: Any) -> None:
         assert max(np.max(np.abs(shape[f"{c}_imag"])) for c in ("u1", "u2", "alpha")) < 1e-9
         assert shape["x"][0] == 0.0
         assert abs(shape["u2"][0]) < 1e-12
-    sine = result.shapes["mode 3: axial 1"]
+    sine = result.shapes["mode 3: 1st axial"]
     np.testing.assert_allclose(sine["u1"], np.sin(np.pi / 2 * sine["x"]), atol=1e-6)
 
 
 def test_mixed_mode_says_so(unit_beam: Any) -> None:
-    """Where lag 2 and axial 1 veer, both share the energy, and the name holds both families."""
+    """Where 2nd edgewise and 1st axial veer, both share the energy, and the name holds both families."""
     scene = unit_beam({"structure.section": section(1 / 20), "structure.hub_radius": 1.0, "motion.speed": 9.0})
     mixed = [row for row in modes(scene).rows if "–" in row["label"]]
     assert len(mixed) >= 2
     for row in mixed:
-        assert {part.split(" ")[0] for part in row["label"].split("–")} == {"lag", "axial"}
+        assert set(row["label"].split(" ")[1].split("–")) == {"edgewise", "axial"}
         assert max(row["share_axial"], row["share_lag"]) < 0.8
 
 
@@ -466,8 +476,8 @@ def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
     torque = {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.0, 0.1, 1.0]]}
     result = modes(unit_beam(motion=torque, modes={"count": 3}))
     assert [row["mode"] for row in result.rows] == [1, 2, 3]
-    assert [row["label"] for row in result.rows] == ["rigid body", "lag 1", "lag 2"]
-    assert list(result.shapes) == ["mode 2: lag 1", "mode 3: lag 2"]
+    assert [row["label"] for row in result.rows] == ["rigid body", "1st edgewise", "2nd edgewise"]
+    assert list(result.shapes) == ["mode 2: 1st edgewise", "mode 3: 2nd edgewise"]
     assert result.draw(tmp_path)[0].is_file()
     alone = modes(unit_beam(motion=torque, modes={"count": 1}))
     assert list(alone.rows[0]) == list(result.rows[0])

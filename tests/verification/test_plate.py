@@ -221,9 +221,9 @@ def test_strip_is_a_beam(spin_up: Any, theory: str, history: float, frequency: f
     for speed in (3.0, 12.0):
         turning = {"type": "constant", "speed": speed}
         rows = rotfem.modes(spin_up({"model.theory": theory}, motion=turning)).rows
-        lag = [row["frequency"] for row in rows if row["label"].startswith("lag")]
+        lag = [row["frequency"] for row in rows if row["label"].endswith("edgewise")]
         scene = strip(model__theory=theory, motion={**turning, "axis": [0, -1, 0]}, modes__count=8)
-        bending = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].startswith("bending")]
+        bending = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].endswith("bending")]
         np.testing.assert_allclose(bending[:3], lag[:3], rtol=frequency)
 
 
@@ -253,14 +253,14 @@ def test_tapered_strip(spin_up: Any) -> None:
     }
     turning = {"type": "constant", "speed": 4.0}
     scene = spin_up({"structure.section": section, "model.theory": "von_karman_linear"}, motion=turning)
-    lag = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].startswith("lag")]
+    lag = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].endswith("edgewise")]
     plate = strip(
         structure__thickness=[[0, 1.5 * DEPTH], [10, 0.5 * DEPTH]],
         model__theory="von_karman_linear",
         motion={**turning, "axis": [0, -1, 0]},
         modes__count=8,
     )
-    bending = [row["frequency"] for row in rotfem.modes(plate).rows if row["label"].startswith("bending")]
+    bending = [row["frequency"] for row in rotfem.modes(plate).rows if row["label"].endswith("bending")]
     np.testing.assert_allclose(bending[:3], lag[:3], rtol=2e-3)  # EI is linear between 41 points, h³ is not
 
 
@@ -478,7 +478,7 @@ def test_modes_in_the_plane_are_those_of_the_beam(theory: str) -> None:
         tables = {"structure": structure | both, "mesh": {"elements": elements}, "modes": {"count": 6}}
         tables |= {"motion": {"type": "constant", "speed": 154.0}, "model": {"theory": theory}}
         rows.append(rotfem.modes(tables).rows)
-    first = [next(r["frequency"] for r in found if r["label"] in ("in-plane 1", "lag 1")) for found in rows]
+    first = [next(r["frequency"] for r in found if r["label"] in ("1st in-plane", "1st edgewise")) for found in rows]
     assert first[1] == pytest.approx(233.0, abs=0.1)
     assert first[0] == pytest.approx(first[1], rel=1e-3)
 
@@ -574,12 +574,13 @@ def test_annular_disk(tmp_path: Path) -> None:
         scene = square(h, structure__length=None, structure__width=None, structure__mesh=str(mesh), modes__count=7)
         found.append(defaultdict(list))
         for row in rotfem.modes(scene).rows:
-            found[-1][row["label"].rstrip("ab")].append(row["frequency"] / unit(h) * outer**2)
+            found[-1][row["label"].split(",")[0]].append(row["frequency"] / unit(h) * outer**2)
     coarse, fine = found
     for m in range(4):
-        pair = np.array(fine[f"diameters {m}.1"])
+        name = f"{m} nodal diameter{'s' * (m != 1)}"
+        pair = np.array(fine[name])
         assert len(pair) == (1 if m == 0 else 2)
-        extrapolated = pair + (pair - np.array(coarse[f"diameters {m}.1"])) / 3
+        extrapolated = pair + (pair - np.array(coarse[name])) / 3
         np.testing.assert_allclose(extrapolated, annulus(m, inner / outer) ** 2, rtol=1e-3)
         assert max(pair) / min(pair) - 1 < 1e-6
 
@@ -602,7 +603,8 @@ def test_travelling_waves(tmp_path: Path) -> None:
     result = rotfem.campbell(scene, [5900.0, 6000.0], orders=0)
     branches = result.branches()
     for m, (low, high) in {1: (10070.0, 10275.0), 2: (12829.0, 13253.0)}.items():
-        a, b = branches[f"diameters {m}.1 forward"], branches[f"diameters {m}.1 backward"]
+        name = ("", "1 nodal diameter", "2 nodal diameters")[m]
+        a, b = branches[f"{name}, forward"], branches[f"{name}, backward"]
         assert sorted([a["frequency"][-1], b["frequency"][-1]]) == pytest.approx([low, high], rel=1e-3)
         assert sorted([a["turning"][-1], b["turning"][-1]]) == pytest.approx([-1.0, 1.0], abs=1e-3)
         # The Coriolis force on the directors couples the angles against the spin: ω₋ > ω₊.

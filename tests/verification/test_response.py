@@ -1,4 +1,4 @@
-"""Frequency response: against the exported matrices, a long time history, statics and the modes."""
+"""Frequency response: against the exported matrices, long time histories, statics."""
 
 from __future__ import annotations
 
@@ -79,30 +79,15 @@ def test_a_load_prestresses_what_is_displaced():
         assert found.real == pytest.approx((ends[0][f"{name}_final"] - ends[1][f"{name}_final"]) / 2, rel=1e-5), name
 
 
-def test_all_modes_are_the_direct_response():
-    """Of 36 unknowns 36 modes, none of them overdamped: the sum over all pairs with left vectors is the inverse."""
-    little = {**STRUCTURE, "damping": {"rayleigh": [0.4, 1e-6]}}
-    whole = response(scene(structure=little, modes={"count": 36}), 1.0, 60.0, number=5)
-    assert whole.summary["difference"]["largest"] < 1e-6
-
-
 @pytest.mark.parametrize("speed", [0.0, 2.0])
 def test_a_hinge_that_nothing_holds(speed):
-    """On the axis it turns as 1/ω², which is no static answer; the modes are those that vibrate."""
+    """On the axis it turns as 1/ω²."""
     loose = {**STRUCTURE, "root": {"lag_stiffness": 0.0}, "damping": {"kelvin_voigt": 1e-4}}
     found = response(scene(speed=speed, structure=loose), 1.0, 40.0, number=9)
-    off = max(abs(row["tip_u2_modal"] - row["tip_u2"]) for row in found.rows)
-    assert off < 1e-5 * max(row["tip_u2"] for row in found.rows)
     swing = 2.0 * LENGTH**2 / (SECTION["mass_per_length"] * LENGTH**3 / 3)  # F L²/I
     assert abs(found.direct[0, 1]) == pytest.approx(swing, rel=2e-2)  # (1/16.7)² of it bends
     with pytest.raises(SceneError, match="a hinge that nothing holds"):
         response(scene(speed=speed, structure=loose), 0.0, 40.0, number=9)
-
-
-def test_few_modes_come_with_the_static_answer_of_the_others(swept):
-    """Below the first mode left out (94 rad/s) what is missing is of order (ω/94)² of its flexibility."""
-    assert swept.rows[0]["difference"] < 1e-12
-    assert swept.rows[2]["difference"] < 1e-4
 
 
 def test_peaks_are_seen(swept):
@@ -161,7 +146,6 @@ def test_a_free_hub_swings_too():
         cosine, sine = np.linalg.lstsq(columns, values[name][last], rcond=None)[0][3:5]
         found = line.direct[0, line.outputs.index(name)]
         assert abs(cosine - 1j * sine - found) < 0.01 * abs(found), name
-    assert line.rows[0]["worst_difference"] < 1e-2
 
 
 def test_a_free_hub_is_not_held():
@@ -191,14 +175,11 @@ def test_damping_of_one_mode_leaves_hardly_any_in_others():
     undamped = [m["frequency"] for m in found.summary["modes"] if abs(m["damping"]) < 1e-8]
     assert undamped
     assert min(np.abs(found.frequencies / omega - 1.0).min() for omega in undamped) > 1e-5
-    assert found.rows[0]["difference"] < 1e-10
 
 
 def test_an_accuracy_is_said_not_to_be_pursued():
-    tables = scene(structure=STRUCTURE)
-    for key, value in (("accuracy", 1e-3), ("model", {"theory": "consistent_linear", "tolerance": 1e-2})):
-        said = response({**tables, key: value}, 1.0, 10.0, number=3).warnings
-        assert any(" is not pursued" in line for line in said)
+    said = response(scene(structure=STRUCTURE, accuracy=1e-3), 1.0, 10.0, number=3).warnings
+    assert any(" is not pursued" in line for line in said)
 
 
 @pytest.mark.parametrize(
@@ -223,7 +204,7 @@ def test_wrong_frequencies_are_refused(low, high, per_rev):
 def test_files_and_figure(swept, tmp_path):
     swept.write(tmp_path)
     table = (tmp_path / "response.csv").read_text().splitlines()
-    assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u1_modal,tip_u2")
+    assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u2")
     assert len(table) == 1 + len(swept.rows)
     assert len(swept.plot().axes) == 8  # amplitudes and phases of tip u and α, of root force and moment
 

@@ -161,12 +161,12 @@ def test_swept_tip_of_epps_and_chandra_at_rest() -> None:
         assert row["frequency"] == pytest.approx(exact, rel=1e-6)
 
 
-# GXBeam 0.5 (its example "Rotating Beam with a Swept Tip", the same exact beam theory), flap 1 at 750 rpm, four digits.
+# GXBeam 0.5 (its example "Rotating Beam with a Swept Tip", the same theory), 1st flapwise at 750 rpm, four digits.
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "gxbeam"), [(0.0, 13.55), (45.0, 13.56)])
 def test_swept_tip_of_epps_and_chandra_spinning(angle: float, gxbeam: float) -> None:
     rows = swept_tip(np.radians(angle), 750 * np.pi / 30, 1)
-    assert rows[0]["label"] == "flap 1"
+    assert rows[0]["label"] == "1st flapwise"
     assert rows[0]["frequency_hz"] == pytest.approx(gxbeam, rel=1e-3)
 
 

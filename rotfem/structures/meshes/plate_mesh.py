@@ -121,7 +121,6 @@ def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
     if comm.rank == 0:
         try:
             groups = read(gmsh, path, tuple(regions) or ("plate",))
-            compat.extract(gmsh.model)
         except BadMesh as error:
             why = str(error)
         except Exception as error:  # the others wait for rank 0: whatever happens there must reach them
