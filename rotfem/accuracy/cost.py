@@ -18,11 +18,11 @@ from rotfem.accuracy.answer import Answer, Answers, Setting, distance
 from rotfem.accuracy.errors import percent
 from rotfem.accuracy.ladder import ladder
 from rotfem.accuracy.refine import MOST_FAILURES, Clock, OverBudget, reduced
+from rotfem.accuracy.tuned import write_variant
 from rotfem.errors import ComputationError, InputError
 from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.files import json_text
 from rotfem.results.result import Row, Rows
-from rotfem.results.tuned import write_variant
 from rotfem.scene import Scene
 
 if TYPE_CHECKING:

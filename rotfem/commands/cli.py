@@ -190,8 +190,8 @@ def explain(
     ] = None,
 ) -> None:
     """Show how much each effect and each theory changes in SCENE, and which it calls for."""
+    from rotfem.accuracy.tuned import write_variant
     from rotfem.commands.explain import explain as estimate
-    from rotfem.results.tuned import write_variant
 
     if write is not None:
         todo.session.check_writable("--write", write, todo.scene.inputs)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from rotfem.commands.cost.result import CostResult
+from rotfem.accuracy.cost import CostResult
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import SHORT, Columns, ShortTable, described, label, numbers
@@ -106,8 +106,8 @@ def cost() -> CostResult:
     """Return a study of four settings: two on the front, one beaten, one failed."""
     setting = {"theory": "reissner", "elements": [4, 2], "degree": 2, "scheme": "newmark", "tolerance": None}
     rows = [
-        {**setting, "step": step, "status": "failed" if error is None else "done", "error": error, "reason": ""}
-        | {"total_error": error, "time": time, "cost": time, "pareto": pareto}
+        {**setting, "step": step, "status": "failed" if error is None else "done", "reason": "", "words": "reissner"}
+        | {"total_error": error, "at_most": False, "cost": time, "pareto": pareto}
         for step, time, error, pareto in (
             (0.01, 4.0, 1e-5, True),
             (0.02, 2.0, 1e-3, True),
@@ -117,7 +117,7 @@ def cost() -> CostResult:
     ]
     said = summary(command="cost", output="tip", accuracy=1e-4, uncertainty=1e-6, recommended=rows[0])
     del said["theory"]  # a study is of several
-    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": []}
+    said |= {"reference": "reissner", "model_errors": {"reissner": 0.0}, "recommendations": []}
     section = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
     structure = {"type": "planar_beam", "length": 1.0, "section": section}
     scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
@@ -215,7 +215,7 @@ def test_tables_of_pandas() -> None:
     rows = explained().to_pandas()
     assert rows.loc["coriolis", "truth_modes"] == 0.021
     assert np.isnan(rows.loc["linear", "truth_modes"])
-    assert np.isnan(cost().to_pandas()["error"][3])
+    assert np.isnan(cost().to_pandas()["total_error"][3])
 
 
 def test_labelled_arrays(tmp_path: Path) -> None:
@@ -239,10 +239,10 @@ def test_labelled_arrays(tmp_path: Path) -> None:
     assert float(branches["frequency"].sel(speed=5.0, label="1st axial")) == 16.0
     assert np.isnan(branches["frequency"].sel(speed=10.0, label="1st axial"))
     study = cost().to_xarray()
-    assert study["time"].attrs["units"] == "s"
+    assert study["cost"].attrs["units"] == "s"
     study.to_netcdf(tmp_path / "cost.nc")
     with xarray.open_dataset(tmp_path / "cost.nc") as again:
-        np.testing.assert_array_equal(again["error"].values, study["error"].values)
+        np.testing.assert_array_equal(again["total_error"].values, study["total_error"].values)
 
 
 def test_names_and_units_of_columns() -> None:
