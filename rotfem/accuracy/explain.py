@@ -16,7 +16,7 @@ import numpy as np
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
-from rotfem.accuracy.errors import ASYMPTOTIC, finer, on_fewer_cells
+from rotfem.accuracy.errors import ASYMPTOTIC, finer, on_other_meshes
 from rotfem.accuracy.ladder import TOLERANCES
 from rotfem.errors import ComputationError, InputError
 
@@ -109,8 +109,8 @@ class Compared:
 
 def settings(own: Setting) -> Iterator[Setting]:
     """Yield settings from the coarsest on: half the cells, the scene's own, twice them where nothing moves."""
-    half = on_fewer_cells(own)
-    first = own if half.factor < 1.0 else half.setting
+    coarse = on_other_meshes(own)[0]
+    first = own if coarse.factor < 1.0 else coarse.setting
     if not own.moving:
         yield from dict.fromkeys((first, own, finer(own)))
         return

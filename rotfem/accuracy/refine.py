@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
-from rotfem.accuracy.errors import ASYMPTOTIC, Errors, attempt, of_theory, row
+from rotfem.accuracy.errors import ASYMPTOTIC, Errors, of_theory, row
 from rotfem.accuracy.ladder import TOLERANCES, ladder
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
@@ -26,9 +26,6 @@ SAFETY = 1.5
 #: Error of a rung of smooth motions as a part of its tolerance, by which the first rung is chosen; it decides nothing
 #: but where the walk begins.
 USUAL = 0.25
-
-#: Part of an accuracy that a cheaper theory may take.
-SHARE = 0.25
 
 #: Rungs that may fail before one that does not.
 MOST_FAILURES = 3
@@ -168,18 +165,16 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
         ComputationError: there is no answer.
         InputError: the scene cannot be computed.
     """
-    found, theory, model = Walk() if found is None else found, answers.scene.model.theory, _Model()
+    found, model = Walk() if found is None else found, _Model()
     before: tuple[int, Answer] | None = None
     apart, refused = math.inf, None
     rungs = list(ladder(answers.scene, moving=answers.moving))
     for rung, setting in starting(rungs, accuracy):
-        setting = replace(setting, theory=theory)
         try:
             clock.begin(setting.words(), found.predicted())
             answer = answers(setting)
             if before is None:
-                theory, model = chosen_theory(answers, answer, accuracy)
-                answer = answers(replace(setting, theory=theory))
+                model = of_named_theory(answers, answer)
         except OverBudget as failure:
             found.failure = failure
             break
@@ -207,7 +202,7 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
         found.failure, found.met = None, errors.total is not None and errors.total <= accuracy
         found.keep(answer, errors)
         if rung + 1 < len(rungs):
-            found.following = replace(rungs[rung + 1], theory=theory), TOLERANCES[rung] / TOLERANCES[rung + 1]
+            found.following = rungs[rung + 1], TOLERANCES[rung] / TOLERANCES[rung + 1]
         if found.met or (model.parts.get("model") or 0.0) > accuracy:
             break
         before = rung, answer
@@ -244,27 +239,9 @@ class _Model:
     unknown: tuple[str, ...] = ()
 
 
-def chosen_theory(answers: Answers, first: Answer, accuracy: float) -> tuple[str, _Model]:
-    """Return the cheapest theory that an accuracy allows, at most that of the scene, and its error.
-
-    A linear theory neglects rotations against 1. So it is tried only where the displacement of the tip over the length,
-    which is at least half of a rotation, is not above the accuracy.
-
-    Args:
-        answers: of the scene.
-        first: answer of its own theory, of which errors are differences.
-        accuracy: wanted.
-    """
-    scene, own = answers.scene, registry.theories[first.setting.theory]
-    if not own.exact:
-        errors = Errors({})
-        return own.name, _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))
-    length = scene.structure.length
-    if answers.moving and scene.accuracy_of != "root_moment" and length and first.output.scale <= accuracy * length:
-        kind = scene.structure.type
-        for name in own.poorer:
-            if name in registry.theories and kind in registry.theories[name].prestress:
-                found, _ = attempt(answers, replace(first.setting, theory=name))
-                if found is not None and (error := distance(first, found).size) <= SHARE * accuracy:
-                    return name, _Model({"model": error})
-    return own.name, _Model()
+def of_named_theory(answers: Answers, first: Answer) -> _Model:
+    """Return the error of the theory that a scene names, by its first answer."""
+    if registry.theories[first.setting.theory].exact:
+        return _Model()
+    errors = Errors({})
+    return _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))

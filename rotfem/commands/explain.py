@@ -226,7 +226,7 @@ class Explanation:
         analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
         spinning = analysis.at(self.speed, count)
         names = analysis.described(spinning).names[: count - int(spinning.rigid)]
-        lasting = [not name.endswith(", fast") for name in names]
+        lasting = [name.rest != "fast" for name in names]
         return Outcome(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
 
     # --- what is made of them ---------------------------------------------------------------------------------------

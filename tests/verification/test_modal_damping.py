@@ -54,13 +54,6 @@ def by_label(result: ModesResult) -> dict[str, float]:
     return {row["label"]: row["damping"] for row in result.rows}
 
 
-def matrices(result: ModesResult, folder: Path) -> tuple[Array, Array, Array]:
-    """Return the M, C and K that are written out."""
-    write_matrices(result.analysis, result.spinning, folder)
-    M, C, K = (mmread(folder / f"{name}.mtx") for name in "MCK")
-    return tuple(A.toarray() if hasattr(A, "toarray") else A for A in (M, C, K))  # type: ignore[return-value]
-
-
 # --- at rest ----------------------------------------------------------------------------------------------------------
 
 
@@ -136,15 +129,10 @@ def test_spinning_modes_are_those_of_the_full_matrices(motion: dict[str, Any]) -
         assert np.min(np.abs(values - value)) < 1e-7 * abs(value)
 
 
-def test_state_space_and_matrices_have_the_poles(tmp_path: Path) -> None:
+def test_state_space_has_the_poles() -> None:
     result = modes(beam([0.02, 0.03], speed=6.0, theory="consistent_linear"))
     poles = np.linalg.eigvals(state_space(result.analysis, result.spinning, 3).A)
     assert np.sort(poles[poles.imag > 0.0]) == pytest.approx(np.sort(result.eigenvalues[:3]), rel=1e-12)
-    M, C, K = matrices(result, tmp_path)
-    x, lam = result.spinning.pairs.right[:, 0], result.eigenvalues[0]
-    x = np.delete(x, result.analysis.system.clamped)
-    residual = (lam**2 * M + lam * C + K) @ x
-    assert np.linalg.norm(residual) < 1e-9 * np.linalg.norm(K @ np.abs(x))
 
 
 def test_response_at_the_resonance_at_rest(tmp_path: Path) -> None:
@@ -152,7 +140,8 @@ def test_response_at_the_resonance_at_rest(tmp_path: Path) -> None:
     load = {"loads.tip_force": {"harmonic": {"amplitude": [0.0, 2.0], "frequency": 1.0}}}
     scene = beam([0.005, 0.01])
     result = modes(scene)
-    M, C, K = matrices(result, tmp_path)
+    write_matrices(result.analysis, result.spinning, tmp_path)
+    M, C, K = (A.toarray() if hasattr(A := mmread(tmp_path / f"{name}.mtx"), "toarray") else A for name in "MCK")
     omega = float(modes(beam(0.0)).frequencies[0])
     force = np.zeros(len(M), dtype=complex)
     tip = int(result.analysis.structure.tip_values.dofs[0, 1]) - len(result.analysis.system.clamped)
@@ -220,15 +209,6 @@ def test_spinning_beam_loses_what_damping_takes() -> None:
     assert energies[0] - energies[-1] == pytest.approx(lost, rel=1e-9)
 
 
-@pytest.mark.estimated
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
-def test_error_of_the_mesh_is_that_of_the_undamped_beam(theory: str) -> None:
-    """Forces on the finer mesh have the damping too: without it they would be out of balance by all of it."""
-    motion = {"motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0}, "time": {"end": 0.5, "step": 0.01}}
-    errors = [run(beam(modal, theory=theory, **motion)).summary["error"]["space"] for modal in (0.0, [0.5, 0.3])]
-    assert 0.3 * errors[0] < errors[1] < 3.0 * errors[0]
-
-
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
 def test_schemes_agree_on_a_free_hub(theory: str) -> None:
     """Bordered equations by blocks, with complex factors: to the error of the second order."""
@@ -271,18 +251,11 @@ def test_it_is_left_out_with_the_effect(theory: str) -> None:
     ("modal", "key", "message"),
     [
         (-0.1, "modal", "at least 0"),
-        (0.48, "modal", ""),  # allowed, if it is large
-        (1.0, "modal", "less than 1"),
-        ("much", "modal", "number"),
-        ([0.01, 48.0], "modal", "0.005 is half a per cent"),
-        ([[0.01]], "modal", "number"),
-        ({"lag": [0.01, True]}, "modal.lag", "number"),
+        ([0.01, 48.0], "modal.1", "less than 1"),
+        ({"lag": [0.01, True]}, "modal.lag.1", "number"),
     ],
 )
 def test_ratios_that_are_none(modal: Any, key: str, message: str) -> None:
-    if not message:
-        assert beam(modal).structure.damping.modal == modal
-        return
     with pytest.raises(SceneError, match=message) as caught:
         beam(modal)
     assert caught.value.key == f"structure.damping.{key}"
