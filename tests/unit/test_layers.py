@@ -25,7 +25,6 @@ ORDER = (
     "structures",
     "equations",
     "analysis",
-    "refinement",
     "accuracy",
     "commands",
 )
