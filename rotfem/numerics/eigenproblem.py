@@ -152,12 +152,13 @@ def mirror_error(values: Array) -> float:
 
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
     """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
-    from scipy.optimize import linear_sum_assignment  # slow to load
-
     distance = np.abs(values[None, :] - wanted[:, None])
     index = np.argmin(distance, axis=1)
-    rows, columns = linear_sum_assignment(distance)
-    index[rows] = columns
+    if len(np.unique(index)) < len(index):
+        from scipy.optimize import linear_sum_assignment  # slow to load
+
+        rows, columns = linear_sum_assignment(distance)
+        index[rows] = columns
     return vectors[:, index]
 
 
