@@ -123,6 +123,10 @@ def along(name: str) -> BeforeValidator:
     return unit(name, over=("m",))
 
 
+#: An annotation of the type of a list: one entry may stand for it.
+LISTED = BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value])
+
+
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 _TABLE = "must be a table of key = value pairs"
