@@ -49,7 +49,7 @@ class Model(SceneModel):
 
     Attributes:
         theory: name of a registered theory, the order of the strain measure.
-        effects: "auto", names of registered effects, those to include, or "needed": those of a history that its accuracy
+        effects: "auto", names of registered effects, those to include, or "needed": those that the accuracy of a run
             calls for.
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
