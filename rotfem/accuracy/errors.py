@@ -325,7 +325,8 @@ def table_lines(rows: list[dict[str, Any]]) -> list[str]:
     cells = [("setting", "error", "CPU s")]
     for r in rows:
         about = "≈ " if r.get("extrapolated") else ""
-        error = r["failed"] if "failed" in r else "–" if r["error"] is None else f"{r['error']:.1e}"
+        size = r.get("error")
+        error = r.get("failed", "–" if size is None else f"{size:.1e}" if size >= 1e-9 else "0")
         cells.append((r["words"], about + error, about + f"{r['seconds']:.2g}"))
     wide = [max(len(line[i]) for line in cells) for i in range(3)]
     return [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells]

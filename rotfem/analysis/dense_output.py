@@ -47,7 +47,7 @@ class RowTimes:
         self._next = int(np.searchsorted(times, start + self._close, side="right"))
         self._reached: list[State] = []
 
-    def __call__(self, old: State, new: State, leg: Any) -> None:
+    def __call__(self, old: State, new: State) -> None:
         """Find the rows in a step from an old to a new state."""
         last = new.t + self._close
         if not self.times[self._next : self._next + 1] <= last:  # there is none, as in most of many short steps

@@ -117,7 +117,7 @@ class System(Solutions, ABC):
         """
         other = copy(self)
         vars(other).pop("balance", None)
-        other._solver, other.factored, other._mass, other.analysed = None, None, None, None
+        other._solver, other._mass, other.analysed = None, None, None
         other.seconds = {"assemble": 0.0, "solve": 0.0}
         other.A = self.assembler.zero()
         return other
