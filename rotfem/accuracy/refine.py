@@ -197,7 +197,7 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
                 errors.each = [float(e * (errors.parts[name] or 0.0) / apart) for e in there.each]
             if len(found.rows) == 1 and math.isfinite(apart):
                 found.rows[0]["error"] = apart  # that of the first, but for the error of this one
-        errors.parts |= model.parts
+        errors.parts |= {**model.parts, **answers.neglected}
         if (lost := answer.outcome.round_off) is not None:
             errors.parts["round_off"] = lost
         found.rows.append(row(answer.setting, errors.total, answer.seconds))
