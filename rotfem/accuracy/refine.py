@@ -77,6 +77,7 @@ class Clock:
         self._began, self._compiling, self._next = self.used(), Compiling.seconds, 1
         if predicted is None:
             return
+        predicted = self._agree(predicted)
         if self.budget is not None and predicted > self.budget - self._began:
             raise self._over(predicted)
         if predicted > LONG:
