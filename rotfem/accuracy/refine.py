@@ -45,10 +45,17 @@ class Clock:
         budget: of all answers together, s; None without a limit.
         agree: value ↦ that of the first of several processes, which decides for all.
         announce: called with a line before every long answer; None for none.
+        key: what the budget is called.
     """
 
-    def __init__(self, budget: float | None, agree: Callable[[float], float] = float, announce: Hint | None = None):
-        self.budget, self._agree, self._announce = budget, agree, announce or (lambda line: None)
+    def __init__(
+        self,
+        budget: float | None,
+        agree: Callable[[float], float] = float,
+        announce: Hint | None = None,
+        key: str = "accuracy_budget",
+    ):
+        self.budget, self._agree, self._announce, self.key = budget, agree, announce or (lambda line: None), key
         self.wanted: float | None = None
         self._started, self._began, self._compiling, self._next = cpu_time(), 0.0, Compiling.seconds, 1
 
@@ -94,7 +101,7 @@ class Clock:
         would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
         left = max(0.0, (self.budget or 0.0) - self._began)
         return OverBudget(
-            f"{would}{left:.2g} s of accuracy_budget are left", advice="a looser accuracy, or a larger accuracy_budget"
+            f"{would}{left:.2g} s of {self.key} are left", advice=f"a looser accuracy, or a larger {self.key}"
         )
 
     def summary(self) -> dict[str, float | None]:
