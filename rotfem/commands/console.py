@@ -128,11 +128,8 @@ class Session:
 
         if self._folder is None:
             return ""
-        path = self._folder.path
-        if (path / "cost.jsonl").exists():
-            return f"; what was measured is in {path}, and the same command goes on from there"
-        found = kept_in(path) if self._folder.summary else []
-        return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
+        found = kept_in(self._folder.path) if self._folder.summary else []
+        return "; ".join(["", f"results until then are in {self._folder.path}", *found]) if found else ""
 
     def _end(self, message: str, status: int, alone: bool = False) -> NoReturn:
         """End this process, at once where the others may be waiting for it, or gone."""
