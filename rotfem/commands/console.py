@@ -128,8 +128,9 @@ class Session:
 
         if self._folder is None:
             return ""
-        found = kept_in(self._folder.path) if self._folder.summary else []
-        return "; ".join(["", f"results until then are in {self._folder.path}", *found]) if found else ""
+        path = self._folder.path
+        found = kept_in(path) if self._folder.summary else []
+        return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
 
     def _end(self, message: str, status: int, alone: bool = False) -> NoReturn:
         """End this process, at once where the others may be waiting for it, or gone."""
