@@ -1,34 +1,32 @@
 """Down the ladder to an accuracy: one rung at a time, until an answer is near enough to the one above it.
 
 With q the ratio of the errors of two rungs and d the distance of their answers, the error of the finer one is
-d/(q − 1). It is taken as SAFETY d/(q − 1) while d is in the asymptotic range, with the observed ratio d'/d of the rungs
-above where that is smaller than q, and as d where it is not, or where the distance does not fall by half.
+d/(q − 1), and is taken as SAFETY times that. q is the ratio of the tolerances or that of the meshes by their order,
+whichever is smaller, and the observed ratio d'/d of the rungs above if that is smaller still. Above the asymptotic
+range it is SAFETY d.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
-from rotfem.accuracy.errors import ASYMPTOTIC, Errors, attempt, of_theory, row
+from rotfem.accuracy.errors import ASYMPTOTIC, Errors, of_theory, row
 from rotfem.accuracy.ladder import TOLERANCES, ladder
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
 from rotfem.results.distance import Spectrum
 
-#: Factor of an extrapolated error.
-SAFETY = 1.5
+#: Factor of an extrapolated error; smallest ratio of the errors of two rungs that is reckoned with.
+SAFETY, SLOW = 1.5, 1.2
 
 #: Error of a rung of smooth motions as a part of its tolerance, by which the first rung is chosen; it decides nothing
 #: but where the walk begins.
 USUAL = 0.25
-
-#: Part of an accuracy that a cheaper theory may take.
-SHARE = 0.25
 
 #: Rungs that may fail before one that does not.
 MOST_FAILURES = 3
@@ -48,10 +46,17 @@ class Clock:
         budget: of all answers together, s; None without a limit.
         agree: value ↦ that of the first of several processes, which decides for all.
         announce: called with a line before every long answer; None for none.
+        key: what the budget is called.
     """
 
-    def __init__(self, budget: float | None, agree: Callable[[float], float] = float, announce: Hint | None = None):
-        self.budget, self._agree, self._announce = budget, agree, announce or (lambda line: None)
+    def __init__(
+        self,
+        budget: float | None,
+        agree: Callable[[float], float] = float,
+        announce: Hint | None = None,
+        key: str = "accuracy_budget",
+    ):
+        self.budget, self._agree, self._announce, self.key = budget, agree, announce or (lambda line: None), key
         self.wanted: float | None = None
         self._started, self._began, self._compiling, self._next = cpu_time(), 0.0, Compiling.seconds, 1
 
@@ -97,7 +102,7 @@ class Clock:
         would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
         left = max(0.0, (self.budget or 0.0) - self._began)
         return OverBudget(
-            f"{would}{left:.2g} s of accuracy_budget are left", advice="a looser accuracy, or a larger accuracy_budget"
+            f"{would}{left:.2g} s of {self.key} are left", advice=f"a looser accuracy, or a larger {self.key}"
         )
 
     def summary(self) -> dict[str, float | None]:
@@ -161,18 +166,16 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
         ComputationError: there is no answer.
         InputError: the scene cannot be computed.
     """
-    found, theory, model = Walk() if found is None else found, answers.scene.model.theory, _Model()
+    found, model = Walk() if found is None else found, _Model()
     before: tuple[int, Answer] | None = None
     apart, refused = math.inf, None
     rungs = list(ladder(answers.scene, moving=answers.moving))
     for rung, setting in starting(rungs, accuracy):
-        setting = replace(setting, theory=theory)
         try:
             clock.begin(setting.words(), found.predicted())
             answer = answers(setting)
             if before is None:
-                theory, model = chosen_theory(answers, answer, accuracy)
-                answer = answers(replace(setting, theory=theory))
+                model = of_named_theory(answers, answer)
         except OverBudget as failure:
             found.failure = failure
             break
@@ -187,20 +190,21 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
         errors = Errors({name: None}, list(model.unknown), answer.output.scale)
         if before is not None:
             there, q = distance(answer, before[1]), TOLERANCES[before[0]] / TOLERANCES[rung]
+            q = min(q, ratio_of(before[1].setting, setting, answers.scene.structure.type == "plate"))
             errors.parts[name] = reduced(there.size, apart, q)
             errors.at, apart = there.at, there.size
             if isinstance(answer.output, Spectrum) and apart > 0.0:
                 errors.each = [float(e * (errors.parts[name] or 0.0) / apart) for e in there.each]
             if len(found.rows) == 1 and math.isfinite(apart):
                 found.rows[0]["error"] = apart  # that of the first, but for the error of this one
-        errors.parts |= model.parts
+        errors.parts |= {**model.parts, **answers.neglected}
         if (lost := answer.outcome.round_off) is not None:
             errors.parts["round_off"] = lost
         found.rows.append(row(answer.setting, errors.total, answer.seconds))
         found.failure, found.met = None, errors.total is not None and errors.total <= accuracy
         found.keep(answer, errors)
         if rung + 1 < len(rungs):
-            found.following = replace(rungs[rung + 1], theory=theory), TOLERANCES[rung] / TOLERANCES[rung + 1]
+            found.following = rungs[rung + 1], TOLERANCES[rung] / TOLERANCES[rung + 1]
         if found.met or (model.parts.get("model") or 0.0) > accuracy:
             break
         before = rung, answer
@@ -223,10 +227,22 @@ def reduced(apart: float, before: float, q: float) -> float | None:
         before: distance of the two rungs above; infinite without them.
         q: ratio of their errors.
     """
-    observed = min(q, before / apart) if apart > 0.0 else q
     if not math.isfinite(apart):
         return None
-    return SAFETY * apart / (observed - 1.0) if apart <= ASYMPTOTIC and observed >= 1.0 + SAFETY else apart
+    observed = min(q, before / apart) if apart > 0.0 else q
+    return SAFETY * apart / (max(observed, SLOW) - 1.0 if apart <= ASYMPTOTIC else 1.0)
+
+
+def ratio_of(coarse: Setting, fine: Setting, plate: bool) -> float:
+    """Return the ratio of the errors by the meshes of two rungs, by the order of displacements.
+
+    That of degrees is (k'/k)² on plates, whose solutions are not smooth (the p-version converges twice as fast as the
+    h-version: Babuška & Suri, SIAM Review 36 (1994) 578), and infinite on beams.
+    """
+    if coarse.degree != fine.degree:
+        return (fine.degree / coarse.degree) ** 2 if plate else math.inf
+    here, there = (n if isinstance(n, tuple) else (n or 1,) for n in (coarse.elements, fine.elements))
+    return float(min(b / a for a, b in zip(here, there, strict=True)) ** (fine.degree + 1))
 
 
 @dataclass(frozen=True)
@@ -237,27 +253,9 @@ class _Model:
     unknown: tuple[str, ...] = ()
 
 
-def chosen_theory(answers: Answers, first: Answer, accuracy: float) -> tuple[str, _Model]:
-    """Return the cheapest theory that an accuracy allows, at most that of the scene, and its error.
-
-    A linear theory neglects rotations against 1. So it is tried only where the displacement of the tip over the length,
-    which is at least half of a rotation, is not above the accuracy.
-
-    Args:
-        answers: of the scene.
-        first: answer of its own theory, of which errors are differences.
-        accuracy: wanted.
-    """
-    scene, own = answers.scene, registry.theories[first.setting.theory]
-    if not own.exact:
-        errors = Errors({})
-        return own.name, _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))
-    length = scene.structure.length
-    if answers.moving and scene.accuracy_of != "root_moment" and length and first.output.scale <= accuracy * length:
-        kind = scene.structure.type
-        for name in own.poorer:
-            if name in registry.theories and kind in registry.theories[name].prestress:
-                found, _ = attempt(answers, replace(first.setting, theory=name))
-                if found is not None and (error := distance(first, found).size) <= SHARE * accuracy:
-                    return name, _Model({"model": error})
-    return own.name, _Model()
+def of_named_theory(answers: Answers, first: Answer) -> _Model:
+    """Return the error of the theory that a scene names, by its first answer."""
+    if registry.theories[first.setting.theory].exact:
+        return _Model()
+    errors = Errors({})
+    return _Model({"model": of_theory(errors, answers, first, first)}, tuple(errors.unknown))

@@ -23,7 +23,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.analysis.reduced_basis import Between
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
-from rotfem.numerics.eigenproblem import SAME
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES
 from rotfem.structures.mode_names import Wave
 
 Array = npt.NDArray[Any]
@@ -33,7 +33,7 @@ SURE, AMBIGUOUS = 0.9, 0.5
 
 #: Least step of the model between two speeds, in parts of their distance (a narrower veering passes as a crossing), and
 #: most of its steps: a veering takes 34.
-FINEST, STEPS = 1e-5, 200
+FINEST, MOST_STEPS = 1e-5, 200
 
 #: Relative error of zeros of a model, and of those that only say where to solve first; the same of critical speeds and
 #: onsets, by an estimate that is 150 times too small near a veering; iterations for that, usually two.
@@ -111,11 +111,11 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
 
     Args:
         values: the eigenvalues, 1/s.
-        bounds: their relative error bounds; what is no farther apart than these, or SAME, is one.
+        bounds: their relative error bounds; what is no farther apart than these, or EQUAL_EIGENVALUES, is one.
     """
     sizes = np.abs(values)
     off = bounds * sizes
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(SAME * sizes[1:], off[1:] + off[:-1])
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(EQUAL_EIGENVALUES * sizes[1:], off[1:] + off[:-1])
     out = [[0]] if len(values) else []
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])
@@ -160,12 +160,12 @@ def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
     both = np.flatnonzero((a.order >= 0) & (b.order >= 0))
     wa, wb = (n.spinning.pairs.values[n.order[both]].imag for n in (a, b))
     da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
-    level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
+    level = EQUAL_EIGENVALUES * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
     asked = both < count
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
-class Model(Protocol):
+class ModesBetween(Protocol):
     """Modes between two speeds without a solution of the whole system."""
 
     def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
@@ -192,7 +192,7 @@ class BranchPath:
         hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
     """
 
-    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], Model], count: int):
+    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], ModesBetween], count: int):
         self.left, self.right, self.count, self._make = left, right, count, model
         self.weak: dict[int, float] = {}
         self.hidden: float | None = None
@@ -202,7 +202,7 @@ class BranchPath:
             self._follow()
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> ModesBetween:
         """Model of the modes between the two speeds."""
         return self._make()
 
@@ -238,7 +238,10 @@ class BranchPath:
         last = self.points[-1]
         assign(last, target)
         if self._unsure(last, target):
-            if target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed) and self._steps < STEPS:
+            if (
+                target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed)
+                and self._steps < MOST_STEPS
+            ):
                 self._steps += 1
                 self._advance(SpeedPoint(self.model.between(0.5 * (last.speed + target.speed)), False))
                 self._advance(target)
@@ -353,9 +356,9 @@ class Sweep:
     def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> BranchPath:
         """Return the way from one point to another; if `square` its model knows the points beside them, too."""
 
-        def model() -> Model:
+        def model() -> ModesBetween:
             if self.is_exact:
-                return cast(Model, self.analysis)
+                return cast(ModesBetween, self.analysis)
             points = self.points if square else []
             beside = [p for p in points if p.speed < left.speed][-1:] + [p for p in points if p.speed > right.speed][:1]
             known = {p.speed: p.spinning for p in (left, right, *beside) if p.speed * (left.speed + right.speed) >= 0.0}

@@ -47,11 +47,14 @@ class RowTimes:
         self._next = int(np.searchsorted(times, start + self._close, side="right"))
         self._reached: list[State] = []
 
-    def __call__(self, old: State, new: State, leg: Any) -> None:
+    def __call__(self, old: State, new: State) -> None:
         """Find the rows in a step from an old to a new state."""
-        end = int(np.searchsorted(self.times, new.t + self._close, side="right"))
+        last = new.t + self._close
+        if not self.times[self._next : self._next + 1] <= last:  # there is none, as in most of many short steps
+            return
+        end = int(np.searchsorted(self.times, last, side="right"))
         times = list(map(float, self.times[self._next : end]))
-        self._next = max(end, self._next)
+        self._next = end
         ends = [new] if times and times[-1] > new.t - self._close else []
         self._reached += between(old, new, times[: len(times) - len(ends)], self.order, self.comm) + ends
 

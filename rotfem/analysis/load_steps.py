@@ -251,7 +251,7 @@ def balance(
 
     increment = limited(system, q, correction)
     if system.linear:
-        if not np.isfinite(increment()) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
+        if not np.isfinite(increment(True)[0]) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
             raise ComputationError(f"no steady state at {speed_text(growth.omega)}: the stiffness is singular")
         newton.iterations += 1
     else:
@@ -263,7 +263,7 @@ def balance(
 
 def limited(
     system: System, x: Array, correction: Callable[[Array | None], Array], soon: int = 4
-) -> Callable[[], float]:
+) -> Callable[[bool], tuple[float, bool]]:
     """Return an iteration of Newton's method, which corrects x by no more than REACH and returns the size.
 
     Args:
@@ -275,14 +275,14 @@ def limited(
     n = len(system.q.x.array)
     before, followed = x[:n].copy(), 0
 
-    def increment() -> float:
+    def increment(renewed: bool = True) -> tuple[float, bool]:
         nonlocal before, followed
         system.set_state(x[:n])
         change = correction(before if followed >= soon else None)
         size, before, followed = float(system.size(change[:n])), x[:n].copy(), followed + 1
         x[:] += change if system.linear or not size > REACH else change * (REACH / size)
         system.set_state(x[:n])
-        return size
+        return size, False
 
     return increment
 

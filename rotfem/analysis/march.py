@@ -1,26 +1,30 @@
-"""The march through a time history, in fixed steps or adaptive ones, over the legs of a time grid."""
+"""A time history, step after step: predict, solve by Newton's method, accept or halve.
+
+A step from t_n to t_n + h solves the stages of a scheme one after the other (`rotfem.analysis.schemes`). A step that
+cannot be solved is halved: a fixed one is taken in two halves, an adaptive one is tried with a shorter length. What one
+step hands to the next is a `State`.
+
+Adaptive steps have local errors that add up to a tolerance, relative to the largest displacement. The controller is
+H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what is allowed (Söderlind, ACM Trans. Math. Softw. 29
+(2003) 1, table 1). No step grows after a rejected one (Hairer, Nørsett & Wanner 1993, section II.4).
+"""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
-from functools import reduce
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
-from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.analysis.stepper import Stepper, seen
-from rotfem.analysis.time_grid import SHORT, Leg, TimeGrid
-from rotfem.equations.modal_damping import EFFECT
+from rotfem.analysis.local_error import LocalError
+from rotfem.analysis.schemes import Array, Observer, Pace, Scheme, Stage, State
+from rotfem.analysis.time_grid import Leg, TimeGrid, knots_of
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
-from rotfem.numerics.linear import ComplexSolver, DirectSolver, combine
-from rotfem.numerics.newton import Newton
-from rotfem.numerics.projection import sparse_part, times, with_ghosts
+from rotfem.numerics.newton import REACH, Factor, Newton
 
 
 @dataclass(frozen=True)
@@ -48,86 +52,61 @@ class Steps:
         return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step, time.breakpoints)
 
 
-def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
-    """Yield the states at step, 2 step, … and end (s); the last step may be shorter.
-
-    Raises:
-        ComputationError: a step failed, however short.
-    """
-    times = TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > 2)
-    reached = state.t
-    for leg, after in pairwise(chain((leg for leg in times if leg.end > reached), [None])):
-        assert leg is not None
-        if state.t == 0.0:
-            state = started(stepper, state, leg)
-        state = travel(stepper, state, leg, after)
-        if leg.whole:
-            yield state
-
-
-def grid(steps: Steps) -> tuple[Array, float]:
-    """Return the ends of fixed steps, the first at 0, and their length (s)."""
-    assert steps.step is not None
-    n = int(np.ceil(steps.end / steps.step - 1e-9))
-    return np.append(np.arange(n) * steps.step, steps.end), steps.step
-
-
-def started(stepper: Stepper, state: State, first: Leg) -> State:
-    """Return the state at t = 0 as the first leg starts from it."""
-    return stepper.restart(state, View(1), View(1, first.line)) if first.line else state
-
-
-def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State:
-    """Return the state at the end of a leg, as the one after it starts from it.
-
-    Raises:
-        ComputationError: the step failed, however short.
-    """
-    old = state
-    with seen(stepper.system, leg.finish) if leg.lands or leg.line else nullcontext():
-        state = stepper.advance(old, leg.length, leg.end)
-    for observe in stepper.observers:
-        observe(old, state, leg)
-    return state if after is None else turned_to(stepper, state, old, leg, after)
-
-
-def turned_to(stepper: Stepper, state: State, old: State, leg: Leg, after: Leg) -> State:
-    """Return the state at the end of a leg as the next leg starts from it; the old one is that of its start."""
-    if after.length != leg.length:
-        state = stepper.scheme.resized(state, old, after.length)
-    if leg.lands or leg.line != after.line:
-        state = stepper.restart(state, leg.finish, View(1, after.line))
-    return state
-
-
 #: Displacement over the length, or rotation in rad, above which the result of a linear theory is refused.
 LARGEST_LINEAR_DEFLECTION = 1.0
+
+#: Halvings of a fixed step that cannot be solved.
+HALVINGS = 5
+
+#: Newton iterations after which a solution counts as a long one, and up to which the prediction was good.
+LONG, SHORT = 6, 3
+
+#: Error of a step that the controller aims at, as a part of the allowed one: a vibration's local error is its largest
+#: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps, also of one that was not solved.
+AIM, SHRINK = 0.5, 0.2
+
+#: The longest step, as a part of the end: a history is drawn.
+LONGEST = 0.05
+
+#: Steps, rejected ones included, after which a march is given up; steps over which its mean step is measured.
+MOST_STEPS, MEAN = 500_000, 5000
+
+#: What to do then.
+QUICKER = (
+    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what "
+    "is quicker than they are; a looser time.tolerance; or an earlier time.end"
+)
 
 
 class March:
     """A time history, state after state.
 
     Args:
-        system: equations of motion.
-        scheme: time-stepping scheme.
+        system: equations of motion; its functions q, v, a are overwritten.
+        scheme: of stages and update maps.
         steps: end and length of the steps.
-        newton: iteration control of the steps.
+        newton: iteration control, shared by all steps so that it learns the quadratic constant.
         q: shape at t = 0 in the turning frame, local dof array of the structure; undeformed if None.
         v: velocities there, relative to the turning frame; it is at rest if None.
 
     Attributes:
-        stepper: what advances the system, with its counts.
-        reached: state that an earlier march has yielded, to go on from; its stepper's numbers must be this one's.
+        reached: state that an earlier march has yielded, to go on from.
+        observers: called with (old state, new state) after every accepted step or part of one.
+        substeps, rejected: steps that were halved as Newton failed, and adaptive ones that were rejected.
     """
 
     def __init__(
         self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None, v: Array | None = None
     ):
-        self.system, self.steps = system, steps
-        self.stepper = Stepper(system, scheme, newton)
+        self.system, self.scheme, self.steps, self.newton = system, scheme, steps, newton
         self.reached: State | None = None
-        self._q = np.zeros_like(system.q.x.array) if q is None else q
-        self._v = v
+        self.observers = list[Observer]()
+        self.substeps = self.rejected = 0
+        self._q, self._v = np.zeros_like(system.q.x.array) if q is None else q, v
+        #: Factors (1, c_v, c_a) of the tangent whose factor is kept; whether the last solution was a long one, and the
+        #: part of a predicted move that it confirmed.
+        self._factored: tuple[float, ...] | None = None
+        self._far, self._trust = False, 1.0
 
     def __iter__(self) -> Iterator[State]:
         """Yield the state at t = 0, unless it goes on from a later one, and at the end of every step.
@@ -140,314 +119,362 @@ class March:
             q, v = self.system.start(self._q)
             if self._v is not None:
                 v[: len(self._v)] += self._v
-            state = self.stepper.start(0.0, q, v)
+            state = State(0.0, q, v, np.zeros_like(q), reference=self.system.reference)
+            state = self.scheme.start(self.accelerated(state, View(1)))
             yield state
-        steps = fixed_steps if self.steps.step is not None else AdaptiveSteps
-        yield from steps(self.stepper, state, self.steps)
+        yield from self._fixed(state) if self.steps.step is not None else self._adaptive(state)
 
+    def warnings(self) -> list[str]:
+        """Return the warnings of a run about halved steps."""
+        return [f"{self.substeps} steps were halved where Newton failed"] if self.substeps else []
 
-#: Error of a step that the controller aims at, as a part of the allowed one: a vibration's local error is its largest
-#: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps.
-AIM, SHRINK = 0.5, 0.2
+    # --- fixed steps -------------------------------------------------------------------------------------------------
 
-#: The longest step, and the intervals over which many knots are averaged, as parts of the end. A history is seldom
-#: drawn with more than 2000 points: what changes faster has the same impulse and first moment in every interval.
-LONGEST, CELL = 0.05, 5e-4
+    def _fixed(self, state: State) -> Iterator[State]:
+        """Yield the states at step, 2 step, … and end (s); the last step may be shorter."""
+        grid, reached = TimeGrid.of(self.system.signals, self.steps, lands=self.scheme.order > 2), state.t
+        for leg, after in pairwise(chain((leg for leg in grid if leg.end > reached), [None])):
+            assert leg is not None
+            start = self.begun(state, View(1), leg) if state.t == 0.0 else state
+            with self.system.view.as_in(leg.finish):
+                state = self.advance(start, leg.length, leg.end)
+            self._observed(start, state)
+            if after is not None:
+                if after.length != leg.length:
+                    state = self.scheme.resized(state, start, after.length)
+                state = self.begun(state, leg.finish, after)
+            if leg.whole:
+                yield state
 
-#: Steps, rejected ones included, after which a march is given up; steps over which its mean step is measured.
-MOST_STEPS, PACE = 500_000, 5000
+    def _observed(self, old: State, new: State) -> None:
+        for observe in self.observers:
+            observe(old, new)
 
-#: What to do then.
-QUICKER = (
-    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what "
-    "is quicker than they are; a looser time.tolerance; or an earlier time.end"
-)
+    # --- adaptive steps ----------------------------------------------------------------------------------------------
 
+    def _adaptive(self, start: State) -> Iterator[State]:
+        """Yield states after steps whose local errors add up to the tolerance."""
+        end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
+        longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
+        error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
+        knots = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
+        state, seen, grows, began = start, View(1), True, start.t
 
-class AdaptiveSteps:
-    """States whose local errors add up to a tolerance, relative to the largest displacement so far.
+        def next_leg() -> tuple[Leg, State]:
+            leg = self._leg(state, min(pace.h, longest), knots, error, tolerance * pace.largest)
+            return leg, self.begun(state, seen, leg) if seen.side else state  # between fits what jumps is negligible
 
-    The controller is H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what is allowed. It filters what
-    vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after a rejected
-    one (Hairer, Nørsett & Wanner 1993, section II.4).
-
-    Steps land on the knots of what is prescribed. Where a cell of the time grid has more than a few of them, signals
-    are straight lines over it.
-
-    Args:
-        stepper: what advances the system.
-        state: at t = 0.
-        steps: `Steps` with a tolerance.
-    """
-
-    def __init__(self, stepper: Stepper, state: State, steps: Any):
-        self.stepper, self.state, self.end = stepper, state, float(steps.end)
-        self.tolerance = float(steps.tolerance)
-        self.longest = steps.max_step or LONGEST * self.end
-        self.shortest = steps.min_step or 1e-9 * self.end
-        self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
-        self.cell, self.least = CELL * self.end, 10 * stepper.newton.tolerance  # of which errors are noise
-        cells = np.append(np.arange(round(1 / CELL)) * self.cell, self.end)
-        legs = list(TimeGrid(stepper.system.signals, cells, self.cell, steps.breakpoints))
-        self.lines = np.array([leg.line for leg in legs if leg.line]).reshape(-1, 2)
-        landings = np.unique([*(leg.end for leg in legs if leg.lands), *self.lines.ravel(), self.end])
-        self.landings = landings[landings > 0.0]
-        self.wanted, self.before, self.largest = min(self.longest, 1e-4 * self.end), 1.0, 1e-6
-        if stepper.pace is not None:
-            self.wanted, self.largest, self.before = stepper.pace
-
-    def __iter__(self) -> Iterator[State]:
-        """Yield the state at the end of every step.
-
-        Raises:
-            ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
-        """
-        state, wanted, stepper, before = self.state, self.wanted, self.stepper, self.before
-        order, most = stepper.scheme.estimate[1] - 1, stepper.scheme.growth
-        switches, began = switches_of(stepper.system), state.t
-        self.largest = max(self.largest, self.measure.displacement(state))
+        leg, start = next_leg()
         for number in range(1, MOST_STEPS + 1):
-            if state.t >= self.end:
-                return
-            if number % PACE == 0:
-                advance, began = (state.t - began) / PACE, state.t
-                if self.end - state.t > 10 * MOST_STEPS * advance:
-                    what = (
-                        f"the last {PACE} steps were of {advance:.3g} s on average: {MOST_STEPS} do not reach the end"
-                    )
-                    raise ComputationError(what, time=state.t, advice=QUICKER)
-            leg = self._next(state.t, wanted)
-            if state.t == 0.0:
-                state = started(stepper, state, leg)
-            new, ratio = self._tried(state, leg)
+            if number % MEAN == 0:
+                began = self._check_mean(state.t, began)
+            # predict and solve
+            with self.system.view.as_in(leg.finish):
+                try:
+                    new = self.step(start, leg.length, leg.end)
+                except ComputationError as failure:
+                    if SHRINK * leg.length < shortest:
+                        raise too_short(shortest, state.t, failure) from failure
+                    ratio = np.inf
+                else:
+                    largest = max(pace.largest, error.displacement(new))
+                    allowed = max(tolerance * largest, 10 * self.newton.tolerance)  # below, errors are noise
+                    ratio = error(self.scheme.local_error(new, start), leg.length) / allowed
+            # accept, or try a shorter one
             if ratio > 1.0:
-                stepper.rejected += 1
-                wanted, most = leg.length * max((ratio / AIM) ** (-1 / order), SHRINK), 1.0
-                if wanted < self.shortest:
-                    what = f"the step fell below {self.shortest:.3g} s without meeting the tolerance"
-                    helps = ["a looser time.tolerance", "a smaller time.min_step", "some damping"]
-                    advice = ", or ".join(helps[: 2 if EFFECT in stepper.system.model.effects else 3])
-                    raise ComputationError(what, time=state.t, advice=advice)
+                self.rejected, grows = self.rejected + 1, False
+                pace = replace(pace, h=leg.length * max((ratio / AIM) ** (-1 / k), SHRINK))
+                if pace.h < shortest:
+                    raise too_short(shortest, state.t)
+                leg, start = next_leg()
                 continue
-            ratio = max(ratio / AIM, 1e-12)
-            factor = float(np.clip((ratio * before) ** (-1 / (6 * order)), SHRINK, most))
-            most = stepper.scheme.growth
-            if leg.length >= wanted or factor < 1.0:
-                wanted, before = min(self.longest, leg.length * factor), ratio
-            if switches is not None:
-                switches.passed(number, state, new)
-            for observe in stepper.observers:
-                observe(state, new, leg)
-            if new.t < self.end:
-                new = turned_to(stepper, new, state, leg, self._next(new.t, wanted))
-            state, stepper.pace = new, (wanted, self.largest, before)
-            yield state
+            wanted, ratio = min(pace.h, longest), max(ratio / AIM, 1e-12)
+            if leg.length < SHRINK * wanted:  # cut short by a knot: of longer steps its error says nothing
+                pace = replace(pace, largest=largest)
+            else:
+                ratio *= max(wanted / leg.length, 1.0) ** k
+                factor = np.clip((ratio * pace.error) ** (-1 / (6 * k)), SHRINK, self.scheme.growth if grows else 1.0)
+                pace = Pace(float(max(wanted, leg.length) * factor), ratio, largest)
+            grows = True
+            self._observed(start, new)
+            state, seen = new, leg.finish
+            if state.t >= end:
+                yield state
+                return
+            leg, start = next_leg()
+            yield start.changed(pace=pace)
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
 
-    def _tried(self, start: State, leg: Leg) -> tuple[State, float]:
-        """Return the state at the end of a leg, and its error as a part of what is allowed."""
-        stepper = self.stepper
-        short = leg.length <= SHORT * self.longest
-        with seen(stepper.system, leg.finish):
-            try:
-                new = stepper.advance(start, leg.length, leg.end, 5 if short else 0)
-            except ComputationError:
-                if short:
-                    raise
-                return start, np.inf
-        local = stepper.scheme.local_error(new, start)
-        self.largest = max(self.largest, self.measure.displacement(new))
-        if local is None:  # a fallback has taken it
-            return new, 1.0
-        return new, self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
+    def _check_mean(self, t: float, began: float) -> float:
+        """Return t; refuse a mean step since another time (s) that is far too short to reach the end."""
+        mean = (t - began) / MEAN
+        if self.steps.end - t > 10 * MOST_STEPS * mean:
+            what = f"the last {MEAN} steps were of {mean:.3g} s on average: {MOST_STEPS} do not reach the end"
+            raise ComputationError(what, time=t, advice=QUICKER)
+        return t
 
-    def _next(self, t: float, wanted: float) -> Leg:
-        """Return a leg from t (s) that is about as long as wanted and passes no landing."""
-        stop = float(self.landings[np.searchsorted(self.landings, t * (1 + SAME), side="right")])
-        left, h = stop - t, min(wanted, self.longest)
-        if lands := h >= left * (1 - 1e-9):
-            h = left
-        else:
-            h = left / 2 if h > 0.6 * left else h
-            stop = t + h
-        i = int(np.searchsorted(self.lines[:, 1], t + 0.5 * h))
-        there = i < len(self.lines) and self.lines[i, 0] < t + 0.5 * h
-        return Leg(stop, h, lands, (float(self.lines[i, 0]), float(self.lines[i, 1])) if there else None)
+    def _leg(self, state: State, wanted: float, knots: Array, error: LocalError, allowed: float) -> Leg:
+        """Return an interval from a state on that is about as long as wanted.
 
-
-#: Filters, of owned arrays, are made for steps in this ratio; the last ones are kept, as a complex factor is large.
-COARSE = 1.5
-Filter = Callable[[Array], Array]
-
-
-class ErrorMeasure:
-    """Error at the end of a history that a step's local error leads to if every step were like this one.
-
-    A vibration of frequency ω and amplitude A has a local error e of C (ωh)ᵐ A in every step. N such steps add up to
-    N C (ωh)ᵐ A, but never to more than 2 A, the vibration in opposite phase: what is small need not be resolved. A
-    Butterworth filter B leaves N e where that is below 2 A, half of it where both are equal, and less than 2 A beyond:
-
-        B = 1/(1 + (τω)²ⁿ),    N C (h/τ)ᵐ = 2,    n = m/2, rounded up.
-
-    An unresolved vibration has an e of up to (s ωh)² A, of which the filter 1/(1 + (s ωh)²) leaves A: it counts with
-    its amplitude. The error is the larger of both, times 2 for the half that B leaves.
-
-    B is applied as n filters one after the other, for the n roots X of Xⁿ = −1:
-
-        z (z M + τ C + τ²/z K)⁻¹ M e,    z² = −X,    Re z > 0.
-
-    Matrices are those at the start. The angle of a free hub is among the unknowns, as the hub moves with vibrations.
-    With C, motions that strong damping stops within the step are filtered too (as any stiff component: Hairer & Wanner
-    1996, eq. (IV.8.20)).
-
-    Args:
-        system: equations of motion; state and time of the start are set in it.
-        scheme: whose local errors are measured.
-        end: length of the history, s.
-    """
-
-    def __init__(self, system: Any, scheme: Scheme, end: float):
-        self.inner, self.end, self.scheme = system.held, end, scheme
-        self.inner.set_time(0.0, self.inner.model.problem.motion)  # of a free hub the speed it starts with, not of now
-        self.inner.set_state(self.inner.zeros())
-        self._matrices = system.with_hub(self.inner.mass_damping_stiffness())
-        self._owned = self.inner.V.dofmap.index_map.size_local * self.inner.V.dofmap.index_map_bs
-        self._length: int | None = None
-        self._filters: list[list[Filter]] = []
-
-    def __call__(self, error: Array, h: float) -> float:
-        """Return the largest entry of the error, in units of the unknowns' scale.
-
-        Args:
-            error: local error of q, local dof array; of a free hub with that of its angle last.
-            h: length of the step, s.
+        It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible:
+        then they are their best cubics in it.
         """
-        e = np.full(self._matrices[0].getLocalSize()[0], error[-1])  # the last process has the angle of a hub
-        e[: self._owned] = error[: self._owned]
-        length = round(np.log(h) / np.log(COARSE))
-        if length != self._length:
-            self._length, self._filters = length, self._made(COARSE**length)
-        filtered = (reduce(lambda e, through: through(e), filters, e)[: self._owned] for filters in self._filters)
-        adds_up, remains = (self.size(with_ghosts(self.inner.V, x)) for x in filtered)
-        return 2.0 * max(self.end / h * adds_up, remains)
+        t, end = state.t, float(self.steps.end)
+        left = end - t
+        h = left if wanted >= left * (1 - 1e-9) else left / 2 if wanted > 0.6 * left else wanted
+        stop = end if h == left else t + h
+        first, last = np.searchsorted(knots, (t * (1 + SAME) + SAME * end, stop - SAME * end), side="right")
+        if first == last:
+            at = last < len(knots) and knots[last] <= stop + SAME * end
+            return Leg(stop, h, lands=bool(at))
+        fitted = Leg(stop, h, line=(t, stop, 3))
+        inside = knots[first:last]
+        if len(inside) > 1 and self._lost(state, fitted, inside, error) <= allowed:
+            return fitted
+        stop = float(inside[0])
+        return Leg(stop, stop - t, lands=True)
 
-    def size(self, x: Array) -> float:
-        """Return the largest displacement of points of the sections in a local dof array, over the length."""
-        return float(self.inner.displaced(x).max() / self.inner.structure.length)
+    def _lost(self, state: State, leg: Leg, knots: Array, error: LocalError) -> float:
+        """Return the displacement by what an interval loses of the signals, over all intervals like it (scaled).
 
-    def displacement(self, state: State) -> float:
-        """Return the largest displacement of a state relative to the turning frame, in units of its scale."""
-        q, clamp = state.q[: len(self.inner.scale)], self.inner.clamp
-        if clamp is not None:
-            x = self.inner.V.tabulate_dof_coordinates()[:, 0]
-            q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
-        return self.size(q)
+        It is that of the tangent in a motion as quick as the knots follow each other, by the largest deviation.
+        """
+        s, n = self.system, len(knots)
+        if s.clamp is not None or leg.line is None:
+            return np.inf
+        times = np.append(knots, leg.end)
+        off = sum(signal.deviation(times, *leg.line) for signal in s.signals)
+        t, c = float(times[int(np.argmax(off))]), np.pi * n / leg.length
+        s.count_rotations_from(state.reference)
+        moved = []
+        for view in (View(-1), View(0, leg.line)):
+            with s.view.as_in(view):
+                s.set_time(t)
+                s.set_state(state.q, state.v, state.a)
+                moved.append(np.array(s.correction((1.0, c, c * c))))
+        return error.size(moved[1] - moved[0]) * self.steps.end / leg.length
 
-    def _made(self, h: float) -> list[list[Filter]]:
-        """Return the filters of B, and that of unresolved vibrations, for steps of h (s)."""
-        constant, order, lost = self.scheme.estimate
-        n, tau = (order + 1) // 2, h * (0.5 * constant * self.end / h) ** (1 / order)
-        B = [self._filter(np.exp(0.5j * np.pi * k / n), tau) for k in range(n - 1, -1, -2)]
-        return [B, [self._filter(1.0, lost * h)]]
+    # --- one step ----------------------------------------------------------------------------------------------------
 
-    def _filter(self, z: complex, tau: float) -> Filter:
-        """Return the filter of z, of a complex one with that of its conjugate."""
-        (M, C, K), weights = self._matrices, np.array([z, tau, tau**2 / z])
-        if np.isreal(z):
-            real = DirectSolver(combine(sparse_part(M).duplicate(), [M, C, K], weights.real))
-            return lambda e: real.solve_all(times(M, e[:, None]))[:, 0]
-        solver = ComplexSolver((M, C, K))
-        solver.factor(list(weights))
-
-        def both(e: Array) -> Array:
-            x = z * solver.solve(times(M, e[:, None])[:, 0].astype(np.complex128))
-            return np.real(z * solver.solve(times(M, np.stack([x.real, -x.imag], axis=1)) @ (1.0, 1.0j)))
-
-        return both
-
-
-#: Switches undone in the very next step, and steps meanwhile, that make a sliding mode. A switch that the motion passes
-#: is not undone at once.
-RETURNS, STEPS = 20, 2000
-
-#: What to do where there is one.
-SMOOTHER = (
-    "a torque that is continuous there, as one proportional to the deviation between its limits, or a hysteresis that "
-    "leaves the motion time between two switches"
-)
-
-
-class Switches:
-    """Detects sliding modes of a torque that jumps with the motion, as a relay does, by counting switches over steps.
-
-    A single switch is resolved by the step-size control. Where the torque drives the motion back from either side of
-    its jump (a sliding mode, Filippov 1988, section 4) an implicit step may have no solution, and adaptive steps follow
-    every switch.
-
-    Args:
-        system: equations of motion of a free hub.
-    """
-
-    def __init__(self, system: Any):
-        self.system, self.torque = system, system.hub.torque
-        self._returns: deque[tuple[int, float]] = deque(maxlen=RETURNS)
-        self._switched = False
-
-    def passed(self, number: int, old: State, new: State) -> None:
-        """Count the switches of a step.
+    def advance(self, state: State, h: float, end: float, halvings: int = HALVINGS) -> State:
+        """Return the state at an end (s), state.t + h but for rounding, in halved steps where Newton fails.
 
         Raises:
-            ComputationError: RETURNS steps have undone the switch of the step before.
+            ComputationError: Newton failed at the smallest step too; says how small it was.
         """
-        before, self._switched = self._switched, self.between(self._seen(old), self._seen(new))
-        if not (before and self._switched):
-            return
-        self._returns.append((number, new.t))
-        first, since = self._returns[0]
-        if len(self._returns) < RETURNS or number - first > STEPS:
-            return
-        what = (
-            f"the torque has switched back at once {RETURNS} times in the last {new.t - since:.3g} s, which took "
-            f"{number - first} steps: it holds the motion at its own jump (sliding mode)"
-        )
-        raise ComputationError(what, time=new.t, advice=SMOOTHER)
+        try:
+            return self.step(state, h, end)
+        except ComputationError as failure:
+            if self.system.solved_at_once:
+                raise
+            if halvings == 0:
+                advice = 'a smaller time.step, time.scheme = "energy_conserving", or check load and speed then'
+                what = f"{failure.what} (the step was cut down to {h:.3g} s)"
+                raise ComputationError(what, failure.time, advice) from failure
+        self.substeps += 1
+        middle = self.advance(state, h / 2, state.t + h / 2, halvings - 1)
+        return self.advance(middle, h / 2, end, halvings - 1)
 
-    def within(self, state: State, h: float) -> bool:
-        """Return whether the torque jumps within a time h (s) of a state that goes on with its acceleration."""
-        return self.between(self._seen(state), self._seen(state) + h * np.array([1.0, *self._rates(state)]))
+    def step(self, state: State, h: float, end: float) -> State:
+        """Return the state at an end (s), after a step of length h (s): its stages predicted and solved.
 
-    def between(self, old: Any, new: Any) -> bool:
-        """Return whether the torque jumps on the straight line between two sets of its arguments."""
-        M, there = self._at(old), self._at(new)
-        change = abs(there - M)
-        if change == 0.0:
-            return False
-        for _ in range(52):  # all digits of the arguments
-            middle = 0.5 * (old + new)
-            value = self._at(middle)
-            if abs(value - M) >= abs(there - value):
-                new, there = middle, value
-            else:
-                old, M = middle, value
-            if abs(there - M) < 0.5 * change:
-                return False
-        return True
+        Raises:
+            ComputationError: Newton failed.
+        """
+        if keep_rotations_small(self.system, self.scheme, state, h):
+            self._factored = None
+        start = state if state.jump is None else self._filtered(state, h)
+        new = self.scheme.finish(start, h, self.scheme.solved(start, h, end, self))
+        new.reference = start.reference
+        self.system.check_reach(new.q, new.t)
+        new.given = self.system.given(new, start)
+        return new
 
-    def _at(self, seen: Any) -> float:
-        t, psi, speed, *tip = map(float, seen)
-        return float(
-            self.torque.controller(t, psi, speed, dict(zip(self.system.structure.components, tip, strict=True)))
-        )
+    def predicted(self, stage: Stage, state: State) -> Array:
+        """Return the predicted q of a stage; where the clamp moves the last shape, turned with it."""
+        clamp, end = self.system.clamp, stage.t if stage.over is None else stage.over.end
+        if clamp is None:
+            return stage.q
+        turned = np.asarray(clamp.turned(state.q, state.v, state.t, end))
+        return turned if stage.over is None else (state.q + turned) / 2
 
-    def _seen(self, state: State) -> Any:
-        """Return time, angle, speed and the components of the tip, the arguments of the torque."""
-        self.system.count_rotations_from(state.reference)
-        return np.array([state.t, state.q[-1], state.v[-1], *self.system.tip(state.q, state.t)])
+    def solve(self, stage: Stage, state: State) -> None:
+        """Solve a stage of a step from a state, by Newton's method from its prediction; if that fails, from the state.
 
-    def _rates(self, state: State) -> list[float]:
-        return [state.v[-1], state.a[-1], *np.zeros(len(self.system.structure.components))]
+        Of a large system a factor serves as long as increments shrink by it (see `Factor`).
+
+        Raises:
+            ComputationError: it does not converge, or to a state that is turned inside out.
+        """
+        s = self.system if self.system.linear or stage.over is None else self.system.balance
+        s.set_time(stage.t)
+        if stage.over is not None and s is not self.system:
+            s.begin(stage.over.start, stage.over.end)
+        s.prescribe(stage.t, stage.q, stage.v, stage.a)
+        settles = s.linear and s.settled and not s.current  # the matrix stays from now on, the factor is of another
+        factor = Factor(self._factored == stage.shifts and not settles) if s.keeps_factor else None
+        before, made, move = state.q, 0, stage.q - state.q
+        if self._trust < 1.0 and not s.linear:
+            stage.correct((self._trust - 1.0) * move)
+
+        def increment(renewed: bool) -> tuple[float, bool]:
+            """Correct the stage; return the size of the correction, and whether it is exact."""
+            nonlocal before, made
+            s.set_state(stage.q, stage.v, stage.a)
+            far = not s.linear and (self._far or self.newton.diverging or made >= LONG)
+            dq = s.correction(stage.shifts, before if far else None) if renewed else s.chord()
+            made, size = made + renewed, float(s.increment_size(dq))
+            if s.solved_at_once:
+                stage.correct(dq)
+                return size / (float(s.size(stage.q)) or 1.0), renewed or s.current
+            before = stage.q.copy()
+            stage.correct(dq if size <= REACH else dq * (REACH / size))
+            return size, False
+
+        def size() -> float:
+            return float(s.size(stage.q))
+
+        try:
+            try:
+                self.newton.solve(increment, size, factor)
+            except ComputationError:
+                if s.solved_at_once or self._trust == 0.0:
+                    raise
+                self._far, self._trust, before, made = True, 0.0, state.q, 0
+                stage.correct(state.q - stage.q)
+                self.newton.solve(increment, size)
+        except ComputationError as error:
+            self._factored = None
+            raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
+        self._factored = stage.shifts if s.keeps_factor else None
+        self._far = made > LONG
+        if made > SHORT or self._trust < 1.0:
+            self._trust = trusted_part(s, stage.q - state.q, move)
+        if stage.over is not None and s is not self.system:
+            stage.memory = s.finish(stage)
+        if self.newton.diverging and not s.solved_at_once:
+            check_root(self.system, stage)
+
+    def imbalance(self, stage: Stage) -> Array:
+        """Return −F at a stage (see `Equations`)."""
+        s = self.system
+        s.set_time(stage.t)
+        s.prescribe(stage.t, stage.q, stage.v, stage.a)
+        s.set_state(stage.q, stage.v, stage.a)
+        return np.asarray(s.imbalance())
+
+    # --- after jumps of what is prescribed ---------------------------------------------------------------------------
+
+    def begun(self, state: State, before: View, leg: Leg) -> State:
+        """Return a state as an interval starts from it: with the accelerations after a jump of what drives the system.
+
+        Args:
+            state: at the end of a step.
+            before: how that step evaluates signals here.
+            leg: the interval.
+        """
+        after = View(1, leg.line)
+        if before.side == 0 and before.line == leg.line:
+            return state
+        s, t = self.system, state.t
+        s.count_rotations_from(state.reference)
+        with s.view.as_in(before):
+            old = s.driven(t)
+        with s.view.as_in(after):
+            same = np.allclose(s.driven(t), old, rtol=1e-7, atol=0.0)
+        if s.comm.allreduce(same, MPI.LAND):  # what moves a clamp is on the processes that hold it
+            return state
+        new = self.accelerated(state, after)
+        return self.scheme.jumped(new, new.a - state.a)
+
+    def accelerated(self, state: State, view: View) -> State:
+        """Return a state with the accelerations that its equations of motion give, signals evaluated by a view."""
+        s, t = self.system, state.t
+        new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
+        with s.view.as_in(view):
+            s.prescribe(t, new.q, new.v, new.a)
+            s.set_time(t)
+            s.set_state(new.q, new.v, new.a)
+            change = np.asarray(s.acceleration())
+            new.a += change
+            new.jump = change if state.jump is None else state.jump + change
+            new.given = s.given(new)
+        if new.given is not None and state.given is not None:
+            new.given[:2] = state.given[:2]
+        return new
+
+    def _filtered(self, state: State, h: float) -> State:
+        """Return a state of a free hub after a jump of what drives it, with the accelerations of a step of h (s).
+
+        Those of the equations turn the frame at once by what its smallest part does, which no step resolves; in a
+        frame that is turned too far the angular momentum is lost. In their place are those of the step's own tangent,
+
+            a ← a − Δa + δa,    (M + c_v/c_a C + 1/c_a K) δa = −F(q, v, a − Δa),    1/c_a = O(h²),
+
+        which are right to O(h²) where the step resolves them, and bounded where it does not.
+        """
+        s, jump, small = self.system, state.jump, self.newton.tolerance
+        if not self.scheme.filters_jumps or s.hub is None or jump is None or s.increment_size(h * h * jump) <= small:
+            return state
+        shifts = self.scheme.stage(0, state, h, state.t + h, ()).shifts
+        with s.view.as_in(View(1, s.view.line)):
+            s.count_rotations_from(state.reference)
+            s.set_time(state.t)
+            s.set_state(state.q, state.v, state.a - jump)
+            change = shifts[2] * s.correction(shifts) - jump
+        return self.scheme.jumped(state.changed(a=state.a + change), change)
 
 
-def switches_of(system: Any) -> Switches | None:
-    """Return the detector of sliding modes of a controlled torque of a free hub; None without one."""
-    return Switches(system) if system.hub is not None and system.hub.torque.controlled else None
+def too_short(shortest: float, t: float, failure: ComputationError | None = None) -> ComputationError:
+    """Return the error of an adaptive step that would have to be shorter than allowed."""
+    if failure is not None:
+        return ComputationError(f"{failure.what} (the step was cut down to {shortest:.3g} s)", t, failure.advice)
+    what = f"the step fell below {shortest:.3g} s without meeting the tolerance"
+    return ComputationError(what, time=t, advice="a looser time.tolerance, a smaller time.min_step, or more damping")
+
+
+def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
+    """Count rotations from the present shape if a step of h (s) might leave their range; return whether that was done.
+
+    The state is changed in place: the same motion in new coordinates. A memory of the scheme that is a second rate, as
+    an auxiliary acceleration, is converted; any other is made anew by the scheme.
+    """
+    turns = system.structure.turns
+    if turns is None:
+        return False
+    system.count_rotations_from(state.reference)
+    if not turns.is_due(state.q, state.v, h):
+        return False
+    is_rate = isinstance(state.memory, np.ndarray) and state.memory.shape == state.a.shape
+    q, v, a = state.q.copy(), state.v.copy(), state.a.copy()
+    before = a if state.jump is None else a - state.jump
+    second = [a, before.copy(), state.memory.copy()] if is_rate else [a, before.copy()]
+    reference = turns.reset(q, v, second)
+    system.count_rotations_from(reference)
+    state.q, state.v, state.a, state.reference = q, v, a, reference
+    state.jump = None if state.jump is None else a - second[1]
+    state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
+    return True
+
+
+def trusted_part(system: Any, move: Array, predicted: Array) -> float:
+    """Return the part c of a predicted move p that is closest to the computed move m: m·p/p·p, cut to 0 … 1.
+
+    It is 1 where the motion is smooth. Of vibrations that the steps do not resolve a prediction by constant
+    acceleration is worse than none, as h²q̈ is much larger than they are.
+    """
+    length = system.product(predicted, predicted)
+    part = float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0
+    return part if part < 0.9 else 1.0
+
+
+def check_root(system: Any, stage: Stage) -> None:
+    """Refuse a solved stage that is turned inside out.
+
+    Raises:
+        ComputationError: it is.
+    """
+    system.set_state(stage.q, stage.v, stage.a)
+    if not system.linear and system.model.inside_out():
+        raise ComputationError("Newton met a state turned inside out (an axial strain below −1)", time=stage.t)

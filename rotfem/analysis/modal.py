@@ -33,7 +33,7 @@ from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
@@ -441,4 +441,4 @@ def stability(lam: complex, bound: float = 0.0) -> str:
         return "unresolved"
     if lam.real <= max(GROWTH, bound) * abs(lam):
         return "stable"
-    return "static instability" if lam.imag <= SAME * abs(lam) else "dynamic instability"
+    return "static instability" if lam.imag <= EQUAL_EIGENVALUES * abs(lam) else "dynamic instability"

@@ -40,8 +40,19 @@ Array = npt.NDArray[np.float64]
 Shifts = tuple[float, float, float]
 
 
-#: A time (s), and q, v, a at it.
-Instant = tuple[float, Array, Array, Array]
+@dataclass(frozen=True)
+class Pace:
+    """Memory of the step-size controller.
+
+    Attributes:
+        h: length of the next step, s.
+        error: of the last step, as a part of the one aimed at.
+        largest: displacement so far (scaled).
+    """
+
+    h: float
+    error: float
+    largest: float
 
 
 @dataclass
@@ -56,8 +67,8 @@ class State:
             moment (N·m) of the forces from outside now; None where the hub is not free.
         reference: what the rotations in q are counted from; None for the undeformed structure.
         balanced: whether the equations hold with q, v and a; otherwise a is that of another instant.
-        inner: instants (s) within the step that led here at which the equations hold, too, and q, v, a there.
         jump: what of a came at once, at the start or by a jump of what drives the system; None of a step's end.
+        pace: memory of the step-size controller; None before the first adaptive step.
     """
 
     t: float
@@ -68,8 +79,8 @@ class State:
     given: Array | None = None
     reference: Any = None
     balanced: bool = True
-    inner: tuple[Instant, ...] = ()
     jump: Array | None = None
+    pace: Pace | None = None
 
     @classmethod
     def at_rest(cls, system: Any, q: Array, v: Array | None = None) -> State:
@@ -85,17 +96,6 @@ class State:
     def changed(self, **changes: Any) -> State:
         """Return a copy with other values."""
         return replace(self, **changes)
-
-    def after(self, before: State) -> State:
-        """Return the state as the end of one step with the part that led to another state, `before`.
-
-        What is between is known as well as in other steps, by an instant in the middle of each part.
-        """
-        if not self.inner:
-            return self
-        parts = [part.inner[len(part.inner) // 2] for part in (before, self) if part.inner]
-        middle = (before.t, before.q, before.v, before.a)
-        return self.changed(inner=tuple(sorted([*parts, middle], key=lambda instant: instant[0])))
 
 
 @dataclass(frozen=True)
@@ -134,20 +134,11 @@ class Stage:
     def __post_init__(self) -> None:
         self.shifts = (1.0, self.c_v, self.c_a)
 
-    def begin_at(self, values: tuple[Array, Array, Array]) -> None:
-        """Write copies of q, v and a."""
-        self.q[:], self.v[:], self.a[:] = values
-
     def correct(self, dq: Array) -> None:
         """Add a correction of q, and what follows from it to v and a."""
         self.q += dq
         self.v += self.c_v * dq
         self.a += self.c_a * dq
-
-
-def inner(stages: Sequence[Stage]) -> tuple[Instant, ...]:
-    """Return the instants of stages before the last one, in their order in time."""
-    return tuple(sorted(((s.t, s.q, s.v, s.a) for s in stages[:-1]), key=lambda instant: instant[0]))
 
 
 class Equations(Protocol):
@@ -168,9 +159,6 @@ class Equations(Protocol):
 
     def imbalance(self, stage: Stage) -> Array:
         """Return −F at a stage, zero at clamped unknowns; the owned part, of a free hub with that of its angle last."""
-
-    def linearised(self, stage: Stage | None) -> Any:
-        """Return M, C and K at a stage; of None the present ones, or None if they may not be reused."""
 
 
 def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
@@ -195,13 +183,13 @@ class Scheme(ABC):
     name: ClassVar[str]
     order: ClassVar[int]
     stages: ClassVar[int] = 1
-    #: Whether a step of a free hub starts with the part of a jump of accelerations that it resolves (see `Stepper`).
+    #: Whether a step of a free hub starts with the part of a jump of accelerations that it resolves (see `March`).
     filters_jumps: ClassVar[bool] = False
 
     #: (C, m, s) of the `local_error` of a vibration of frequency ω and amplitude A: C (ωh)^m A where it is resolved,
     #: (s ωh)² A where it is not. Largest ratio of two adaptive steps.
     estimate: ClassVar[tuple[float, int, float]] = (1 / 12, 3, 0.3)
-    growth: ClassVar[float] = 2.0
+    growth: ClassVar[float] = 5.0
 
     @abstractmethod
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
@@ -248,17 +236,9 @@ class Scheme(ABC):
         """Return a state whose acceleration has jumped by a change, with the memory that a step from it needs."""
         return self.start(state)
 
-    def kinked(self, state: State) -> State:
-        """Return a state at which a signal has a kink: its rate jumps, the acceleration does not."""
-        return state
-
     def local_error(self, new: State, old: State) -> Array | None:
         """Return the estimated error of q of the step from old to new; None if there is none."""
         return None
-
-    def fallbacks(self) -> tuple[Scheme, ...]:
-        """Return more robust schemes for steps that this one cannot take, in the order they are tried."""
-        return ()
 
     def resized(self, new: State, old: State, h: float) -> State:
         """Return the state for steps of another length h (s) than that of the step from old to new."""
@@ -273,8 +253,8 @@ class Scheme(ABC):
 class Observer(Protocol):
     """An observer of the steps of a march."""
 
-    def __call__(self, old: State, new: State, leg: Any) -> None:
-        """Observe a step from an old to a new state, over a leg of the time grid (see `time_grid.Leg`)."""
+    def __call__(self, old: State, new: State) -> None:
+        """Observe a step, or a part of one, from an old to a new state."""
 
 
 # --- of second order --------------------------------------------------------------------------------------------------
@@ -329,24 +309,12 @@ class AlphaFamily(Scheme):
         s.carried += (1 - alpha_f) / (1 - alpha_m) * s.a
         return State(s.t, s.q, s.v, s.a, s.carried)
 
-    def local_error(self, new: State, old: State) -> Array:
-        """Return |β − 1/6| h² |a_{n+1} − a_n|.
-
-        Zienkiewicz & Xie 1991, eq. (14): the term of the Taylor series that Newmark's β does not match.
-        """
-        h, beta = new.t - old.t, self.coefficients[2]
-        change: Array = new.memory - old.memory
-        return abs(beta - 1 / 6) * h * h * change
-
     def resized(self, new: State, old: State, h: float) -> State:
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
         It stands for q̈ at t + h (α_m − α_f), so it changes with h; without this a change of step would cost an order.
-        Beyond the largest growth of steps it is q̈.
         """
         last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
-        if h > self.growth * last * (1 + 1e-9):
-            return self.start(new)
         return new.changed(memory=new.memory + (alpha_f - alpha_m) * (1 - h / last) * (new.memory - old.memory))
 
 

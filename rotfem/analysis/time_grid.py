@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.mechanics.time_signals import TimeSignal, View
+from rotfem.mechanics.time_signals import Fit, TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
@@ -35,28 +36,20 @@ class Leg:
         end: its last instant, s.
         length: s.
         lands: whether it ends at a knot; the next one starts with the accelerations after it.
-        line: begin and end (s) of the straight lines that replace the signals; None for their values.
+        line: step over which polynomials replace the signals; None for their values.
         whole: whether it ends its step.
     """
 
     end: float
     length: float
     lands: bool = False
-    line: tuple[float, float] | None = None
+    line: Fit | None = None
     whole: bool = True
 
     @property
     def finish(self) -> View:
         """How signals are evaluated at its end."""
         return View(-1 if self.lands else 0, self.line)
-
-    def doubles(self, after: Leg) -> bool:
-        """Return whether this leg and the one after it may be taken as one, in a step of about twice the length.
-
-        There is no knot in them or between, and neither is longer than twice the other.
-        """
-        shorter, longer = sorted((self.length, after.length))
-        return 2 * shorter >= longer * (1 - CLOSE) and not (self.lands or self.line or after.line)
 
 
 class TimeGrid:
@@ -79,9 +72,13 @@ class TimeGrid:
         lands: bool = True,
     ):
         self.times, self.step, self.lands = times, step, lands
-        for signal in signals:
-            find_jumps(signal, times, breakpoints)
-        self.knots = np.unique(np.concatenate([breakpoints, *(s.knots for s in signals)]))
+        self.knots = knots_of(signals, times, breakpoints)
+
+    @classmethod
+    def of(cls, signals: Sequence[TimeSignal], steps: Any, lands: bool) -> TimeGrid:
+        """Return the legs of fixed steps, `Steps` of a march; the last step may be shorter."""
+        n = int(np.ceil(steps.end / steps.step - 1e-9))
+        return cls(signals, np.append(np.arange(n) * steps.step, steps.end), steps.step, steps.breakpoints, lands)
 
     def __iter__(self) -> Iterator[Leg]:
         """Yield the legs of all steps."""
@@ -90,7 +87,7 @@ class TimeGrid:
         ends, knots = [float(t) for t in self.times], after[1:] > after[:-1]
         begin, length = ends[0], self.step
         for i, end in enumerate(ends[1:]):
-            inside: list[float] = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
+            inside: Any = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
             lands = bool(knots[i] and before[i + 1] < after[i + 1])
             last = float(self.knots[before[i + 1]]) if lands else end
             stops = [*inside, last] if self.lands and len(inside) <= FEW else [last]
@@ -103,8 +100,16 @@ class TimeGrid:
                     length = self.step
                 elif abs(taken - length) > close:
                     length = taken
-                yield Leg(stop, length, lands or stop != last, (begin, stop) if lined else None, stop == last)
+                yield Leg(stop, length, lands or stop != last, (begin, stop, 1) if lined else None, stop == last)
                 begin = stop
+
+
+def knots_of(signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = ()) -> Array:
+    """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints."""
+    for signal in signals:
+        find_jumps(signal, times, breakpoints)
+    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *(s.knots for s in signals)]))
+    return found
 
 
 def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:

@@ -20,12 +20,12 @@ from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
-from rotfem.analysis.march import SMOOTHER, March, Steps, switches_of
+from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
-from rotfem.analysis.stepper import Stepper
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
 from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, error_of, to_accuracy, with_error
+from rotfem.commands.explain import needed_model
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
@@ -33,7 +33,7 @@ from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
-from rotfem.errors import ComputationError, Stopped, input_of
+from rotfem.errors import ComputationError, InputError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
@@ -47,6 +47,12 @@ from rotfem.structures.symmetry import inactive_unknowns
 from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
+
+#: What to do where a controlled torque holds the motion at its own jump.
+SMOOTHER = (
+    "a torque that is continuous there, as one proportional to the deviation between its limits, or a hysteresis that "
+    "leaves the motion time between two switches"
+)
 
 
 class Simulation:
@@ -86,8 +92,8 @@ class Simulation:
         self.monitor = Monitor(self.system, critical_speed(self.system) if times is None else None)
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
-        #: What the states came from: of a march its stepper and rows between steps.
-        self.stepper: Stepper | None = None
+        #: What the states came from: of a history its march and rows between steps.
+        self.march: March | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
         self.shape: Array | None = None
@@ -203,14 +209,14 @@ class Simulation:
         """March through the history."""
         scheme, newton = scheme_of(time), self.iteration
         march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
-        self.stepper = march.stepper
+        self.march = march
         march.reached = self.store.start(self._memory())
         times = self.times if time.output_step is None else multiples(time.output_step, time.end)
         if times is not None:
             begin = 0.0 if march.reached is None else march.reached.t
             self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
-            self.stepper.observers.append(self.rows)
-        self.stepper.observers.append(self._leg)
+            march.observers.append(self.rows)
+        march.observers.append(self._leg)
         with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
@@ -224,7 +230,7 @@ class Simulation:
 
     # --- what sees them ---------------------------------------------------------------------------------------------
 
-    def _leg(self, old: State, new: State, leg: Any) -> None:
+    def _leg(self, old: State, new: State) -> None:
         self.log.parts += 1
 
     def _sampled(self, state: State) -> None:
@@ -256,14 +262,14 @@ class Simulation:
     def _memory(self) -> Memory:
         """Return what a checkpoint holds."""
         assert self.scene.time is not None
-        return Memory(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log)
+        return Memory(self.scene.time, self.system, self.march, self.record, self.monitor, self.log)
 
     # --- the result -------------------------------------------------------------------------------------------------
 
     def summarised(self, status: str, failure: ComputationError | None = None) -> RunResult:
         """Return everything computed so far with a summary of how it went."""
         history, log = self.record.history.arrays(), self.log
-        log.warnings += [] if self.stepper is None else self.stepper.warnings()
+        log.warnings += [] if self.march is None else self.march.warnings()
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
         watched = self.monitor
@@ -287,21 +293,20 @@ class Simulation:
 
     def _with_cause(self, error: ComputationError) -> ComputationError:
         """Return a failure, with what was wrong before it as its cause if something was."""
-        if self.stepper is None:
+        if self.march is None:
             return error
         if self.log.steps == 0:
             self.system.held.model.check_smooth()
-        switches, step = switches_of(self.system), self.scene.time and self.scene.time.step
-        if switches is not None and step and self.last is not None and switches.within(self.last, step):
-            what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
+        if self.system.hub is not None and self.system.hub.torque.controlled:
+            what = f"{error.what}; where a torque jumps with the motion, the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)
         return error
 
     def _summary(self, status: str, history: dict[str, Array]) -> dict[str, Any]:
         """Return what was computed and how it went."""
-        scene, system, log, stepper = self.scene, self.system, self.log, self.stepper
+        scene, system, log, march = self.scene, self.system, self.log, self.march
         space, mesh = system.V.dofmap, system.structure.mesh
-        parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
+        parts = {"compile": self.compiled, **(system.seconds if march else {})}
         before = {"before": log.elapsed} if log.resumed else {}
         out = {
             **summary("run", scene, self.comm, system.comm),
@@ -314,7 +319,7 @@ class Simulation:
             "elements": mesh.topology.index_map(mesh.topology.dim).size_global,
             "steps": log.steps,
             "newton_iterations": self.iteration.iterations,
-            "factorisations": system.factorisations if stepper else self.iteration.iterations,
+            "factorisations": system.factorisations if march else self.iteration.iterations,
             "timings": timings(parts, log.started, before),
             "figures": figures(history),
             "warnings": log.warnings,
@@ -327,8 +332,8 @@ class Simulation:
             out["figures"]["critical_speed"] = self.monitor.critical
         if log.resumed:
             out["resumed"] = log.resumed
-        if stepper is not None and stepper.rejected:
-            out["rejected_steps"] = stepper.rejected
+        if march is not None and march.rejected:
+            out["rejected_steps"] = march.rejected
         if self.problem.inactive:
             why = "structure, loads and spin are symmetric, so that nothing moves them"
             out["left_out"] = {"unknowns": list(self.problem.inactive), "why": why}
@@ -421,9 +426,18 @@ def simulate(
             check_steady(Problem.of(scene, terms=terms, outputs=outputs))
         if scene.accuracy is not None:
             check_of(scene, ("tip", ROOT_MOMENT), "run")
-            answers.times = rows_of(scene)
-            done: RunResult = to_accuracy(answers, output_of(scene), clock, comm, lambda result, errors: result)
+            answers.times, more = rows_of(scene), dict[str, Any]()
+            if scene.model.effects == "needed" and output_of(scene) == "tip":
+                found = needed_model(scene, terms or {}, comm)
+                answers.scene = scene.replace({"model.effects": list(found.effects)})
+                answers.neglected = {"effects": found.change}
+                more = {"needed": {"dropped": list(found.dropped), "change": found.change}}
+            done: RunResult = to_accuracy(
+                answers, output_of(scene), clock, comm, lambda result, errors: result.with_summary(**more)
+            )
             return done
+        if scene.model.effects == "needed":
+            raise InputError("model.effects", "needed", "needs accuracy, which says what is needed")
         simulation = Simulation(scene, Problem.of(scene, terms=terms, outputs=outputs), store)
         also, critical = hints_of_start(scene, simulation.problem), simulation.monitor.critical
         simulation.log.advice = advise(scene, hint, critical=critical, also=also)

@@ -1,7 +1,7 @@
 """What of a run is on disk while it goes on: the rows of its history, and checkpoints.
 
 A checkpoint holds the state (t, q, v, a and the memory of the scheme), the rows so far, and what observers and the
-stepper remember. Of a shared mesh it has the arrays of every process. Factors and matrices are made anew, so that a run
+march remember. Of a shared mesh it has the arrays of every process. Factors and matrices are made anew, so that a run
 that goes on agrees with an unbroken one up to the tolerance of its iterations.
 """
 
@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from rotfem.analysis.march import March
 from rotfem.analysis.schemes import State
-from rotfem.analysis.stepper import Stepper
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.errors import SceneError, Stopped
@@ -45,18 +45,18 @@ REMEMBERED = {
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
     "record.resultants.frames": ("kept", "_every", "_count"),
-    "stepper": ("pace", "substeps", "rejected", "substituted", "_far", "_reliable", "_exchange"),
-    "stepper.newton": ("iterations", "roundoff", "_kappa", "_longest"),
+    "march": ("substeps", "rejected", "_far", "_trust"),
+    "march.newton": ("iterations", "roundoff", "_kappa", "_longest"),
 }
 
 
 @dataclass
 class Memory:
-    """The parts of a run that a checkpoint is of; without a stepper nothing can be kept."""
+    """The parts of a run that a checkpoint is of; without a march nothing can be kept."""
 
     time: Time
     system: Any
-    stepper: Stepper | None
+    march: March | None
     record: Recorder
     monitor: Monitor
     log: Log
@@ -70,7 +70,7 @@ class Memory:
         """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
         own = {
             "positions": self.system.V.tabulate_dof_coordinates(),
-            "state": state.changed(inner=()),
+            "state": state,
             "parts": {
                 name: {key: getattr(part, key) for key in REMEMBERED[name]} for name, part in self.parts().items()
             },

@@ -1,40 +1,44 @@
 """`rotfem sweep`: a verb over a grid of scene keys, on one or several processes or ranks; a killed sweep goes on.
 
 Every point has a folder of its own, named after all that its result depends on, with the result as the verb writes it.
-Each worker has points of its own. A point is settled when its summary says done or failed.
+A point is settled when its summary says done or failed. The table sweep.csv grows with them.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import multiprocessing
 import os
 import re
-import subprocess
-import sys
 import tomllib
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
+from multiprocessing.connection import wait
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import click
 import numpy as np
 import typer
 from mpi4py import MPI
+from mpi4py.futures import MPICommExecutor
 
 from rotfem.commands.console import ALONE
-from rotfem.commands.cost.bench import fingerprint
 from rotfem.commands.job import app
 from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
-from rotfem.listeners import ONE_PROCESS, Progress
+from rotfem.listeners import Progress
+from rotfem.results.files import write_text
 from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
 from rotfem.scene import load_scene
 from rotfem.scene.extensions import load, loaded
-from rotfem.version import versions
+from rotfem.version import __version__, versions
 
 #: Verbs that can be swept.
 VERBS = ("run", "modes", "campbell", "response", "check")
@@ -45,7 +49,7 @@ WITH_UNIT = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?+)\s*([^-+.\d\s].*)")
 
 @dataclass(frozen=True)
 class Point:
-    """One point of the grid: values of the swept keys, the changes of the scene that they are, and its folder."""
+    """One point of the grid: values of the keys, the changes of the scene that they are, and its folder."""
 
     values: dict[str, Any]
     changes: list[str]
@@ -55,6 +59,14 @@ class Point:
     def settled(self) -> bool:
         """Whether it is done, or has failed."""
         return read_summary(self.folder).get("status") in ("done", "failed")
+
+    def row(self, reason: str = "") -> dict[str, Any]:
+        """Return its row: values of the keys, what was computed, how it went; or why nothing was."""
+        summary = read_summary(self.folder)
+        status, found = summary.get("status"), quantities(summary) if summary.get("status") == "done" else {}
+        reason = summary["failure"]["what"] if status == "failed" else reason
+        went = {"status": status or "failed", "reason": reason, "seconds": summary.get("timings", {}).get("total", 0.0)}
+        return {**self.values, **found, **went, "folder": self.folder.name}
 
 
 def values_of(text: str) -> list[Any]:
@@ -91,38 +103,56 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
     out = []
     for values in product(*keys.values()):
         changes = [f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in zip(keys, values, strict=True)]
-        name = fingerprint(load_scene(scene, changes), " ".join(verb), 1)
+        read = load_scene(scene, changes)
+        mesh = getattr(read.structure, "mesh", None)
+        content = "" if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
+        text = json.dumps([read.to_dict(), content, " ".join(verb), __version__], sort_keys=True, default=str)
+        name = hashlib.sha256(text.encode()).hexdigest()[:16]
         out.append(Point(dict(zip(keys, values, strict=True)), changes, folder / "points" / name))
     return out
 
 
-def settle(point: Point, scene: Path, verb: Sequence[str]) -> None:
-    """Run the verb at a point in this process, alone, unless that is done; a failure is in the point's summary."""
-    if point.settled:
-        return
+def settle(point: Point, scene: Path, verb: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Any]:
+    """Return the row of a point after the verb was run there in this process, alone, with what files register."""
     import rotfem.commands.cli  # noqa: F401  the verbs
 
+    for file in files:
+        load(str(file), file, "sweep", "--load")
     changes = [part for change in point.changes for part in ("--set", change)]
     given = [*verb[:1], str(scene), *verb[1:], *changes, "-o", str(point.folder), "-q", "--no-plots", "--debug"]
-    token = ALONE.set(True)
+    token, reason = ALONE.set(True), ""
     try:
         app(given, prog_name="rotfem", standalone_mode=False)
     except (ComputationError, InputError) as error:
-        if not point.settled:
-            with ResultFolder(ONE_PROCESS, point.folder, verb[0]) as results:
-                results.begin()
-                results.close(error)
+        reason = str(error)
     finally:
         ALONE.reset(token)
+    return point.row(reason)
 
 
-def work(points: Sequence[Point], scene: Path, verb: Sequence[str], progress: Progress, parent: int = 0) -> None:
-    """Settle points one after the other; stop if the process that started this one is gone."""
-    for number, point in enumerate(points, start=1):
-        if parent and os.getppid() != parent:
-            return
-        settle(point, scene, verb)
-        progress(number / len(points))
+def rows_of(
+    points: Sequence[Point], scene: Path, verb: Sequence[str], jobs: int, comm: MPI.Comm
+) -> Iterator[tuple[Point, dict[str, Any]]]:
+    """Yield points with their rows as they are settled, on several ranks on the first of them alone."""
+    if not points or jobs == comm.size == 1:
+        yield from ((point, settle(point, scene, verb)) for point in points)
+        return
+    spawned = multiprocessing.get_context("spawn")
+    ranks: Any = comm
+    several: Any = MPICommExecutor(ranks) if comm.size > 1 else ProcessPoolExecutor(jobs, spawned, end_with_parent)
+    with several as pool:
+        tasks = {} if pool is None else {pool.submit(settle, p, scene, verb, loaded()): p for p in points}
+        try:
+            yield from ((tasks[task], task.result()) for task in as_completed(tasks))
+        finally:
+            for task in tasks:
+                task.cancel()
+
+
+def end_with_parent() -> None:
+    """Let this process end as soon as the one that started it has ended, however that did."""
+    parent: Any = multiprocessing.parent_process()
+    Thread(target=lambda: (wait([parent.sentinel]), os._exit(1)), daemon=True).start()
 
 
 def sweep(
@@ -135,15 +165,15 @@ def sweep(
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
 ) -> SweepResult:
-    """Return what a verb gives for all combinations of values of scene keys. Points that are done are not done again.
+    """Return what a verb gives for all combinations of values of scene keys. Settled points are not computed again.
 
     Args:
         scene: path of a scene file.
         keys: dotted keys ↦ values.
         verb: its name and options as on the command line, such as `["campbell", "--speeds", "0:10:11"]`.
-        folder: where every point has its results, in `points`.
-        jobs: processes that compute, this one included. They know what the scene or `--load` registers.
-        comm: ranks that share the points, each computing alone.
+        folder: where every point has its results, in `points`, and the table grows.
+        jobs: processes that compute; where there are several, a script guards itself by `if __name__ == "__main__"`.
+        comm: ranks that compute, each alone; of several the first one hands out the points.
         progress: called with the share of the points done, between 0 and 1.
 
     Raises:
@@ -153,40 +183,34 @@ def sweep(
     """
     scene, folder = Path(scene), Path(folder)
     check_asked(keys, verb, jobs, comm)
-    points, progress = grid(scene, keys, verb, folder), progress or (lambda share: None)
-    problem = None
-    try:
-        try:
-            if comm.rank == 0:  # which also compiles the forms
-                settle(points[0], scene, verb)
-        finally:
-            comm.Barrier()
-        with helpers(scene, keys, verb, folder, jobs - 1):
-            share = comm.rank if comm.size > 1 else 0
-            work(points[share :: max(jobs, comm.size)], scene, verb, progress)
-        if jobs > 1:
-            work(points, scene, verb, progress)  # what a helper has left
-    except OutputError as error:
-        problem = error
-    raise_first(comm.allgather(problem))
+    points, problem = grid(scene, keys, verb, folder), None
+    rows = {p.folder: p.row() for p in points if p.settled}
     swept = {key: list(values) for key, values in keys.items() if len(values) > 1}
-    rows = comm.bcast([row_of(point, swept) for point in points] if comm.rank == 0 else None)
-    reasons = [row["reason"] for row in rows if row["status"] != "done"]
-    warnings = [f"{len(reasons)} of {len(rows)} points failed, the first one: {reasons[0]}"] if reasons else []
-    summary = {
-        "command": "sweep",
-        "status": "done",
-        "name": scene.stem,
-        "verb": list(verb),
-        "keys": swept,
-        "fixed": {key: values[0] for key, values in keys.items() if key not in swept},
-        "points": len(points),
-        "failed": len(reasons),
-        "seconds": sum(row["seconds"] for row in rows),
-        "warnings": warnings,
-        "versions": versions(),
-    }
-    return SweepResult(summary, rows)
+    fixed = {key: values[0] for key, values in keys.items() if key not in swept}
+    of_all: dict[str, Any] = {"command": "sweep", "status": "done", "name": scene.stem, "verb": list(verb)}
+    of_all |= {"keys": swept, "fixed": fixed}
+
+    def result() -> SweepResult:
+        those = [{k: v for k, v in rows[p.folder].items() if k not in fixed} for p in points if p.folder in rows]
+        reasons = [row["reason"] for row in those if row["status"] != "done"]
+        warnings = [f"{len(reasons)} of {len(points)} points failed, the first one: {reasons[0]}"] if reasons else []
+        counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in those)}
+        return SweepResult({**of_all, **counts, "warnings": warnings, "versions": versions()}, those)
+
+    with ResultFolder(comm, folder, "sweep", [scene]) as results:
+        results.begin()
+        try:
+            for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
+                rows[point.folder] = row
+                write_text(folder / "sweep.csv", result().texts()["sweep.csv"])
+                if progress is not None:
+                    progress(len(rows) / len(points))
+        except OutputError as error:
+            problem = error
+        raise_first(comm.allgather(problem))
+        found: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
+        results.publish(found)
+        return found
 
 
 def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str], jobs: int, comm: MPI.Comm) -> None:
@@ -195,10 +219,9 @@ def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str], jobs: in
 
     if not verb or verb[0] not in VERBS:
         raise InputError("sweep", " ".join(verb), f"needs -- and a verb after it: {', '.join(VERBS)}")
-    if max((len(values) for values in keys.values()), default=0) < 2 or not all(map(len, keys.values())):
-        raise InputError(
-            "sweep --set", " ".join(keys), "must give a key several values, KEY=first:last:number or KEY=a,b"
-        )
+    if max(map(len, keys.values()), default=0) < 2 or not all(keys.values()):
+        several = "must give a key several values, KEY=first:last:number or KEY=a,b"
+        raise InputError("sweep --set", " ".join(keys), several)
     if jobs < 1 or (jobs > 1 and comm.size > 1):
         raise InputError("sweep --jobs", jobs, "must be at least 1; under mpirun the ranks share the points")
     try:
@@ -206,46 +229,3 @@ def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str], jobs: in
         commands.commands[verb[0]].make_context(verb[0], ["scene", *verb[1:]])
     except click.UsageError as error:
         raise InputError("sweep", " ".join(verb), error.format_message()) from None
-
-
-@contextmanager
-def helpers(
-    scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], folder: Path, number: int
-) -> Iterator[None]:
-    """Let further processes compute points meanwhile."""
-    code = f"from {__name__} import help_out; help_out()"
-    started = [subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE) for _ in range(number)]
-    for share, process in enumerate(started, start=1):
-        assert process.stdin is not None
-        points = [share, number + 1]
-        given = [str(scene), dict(keys), list(verb), str(folder), points, os.getpid(), [*map(str, loaded())]]
-        with suppress(BrokenPipeError), process.stdin as pipe:
-            pipe.write(json.dumps(given).encode())
-    try:
-        yield
-    except BaseException:
-        for process in started:
-            process.terminate()
-        raise
-    finally:
-        for process in started:
-            process.wait()
-
-
-def help_out() -> None:
-    """Compute points in a process that `helpers` has started. What it cannot write the other one says."""
-    scene, keys, verb, folder, (share, jobs), parent, files = json.load(sys.stdin)
-    with suppress(KeyboardInterrupt, OutputError):
-        for file in files:
-            load(file, Path(file), "sweep", "--load")
-        points = grid(Path(scene), keys, verb, Path(folder))[share::jobs]
-        work(points, Path(scene), verb, lambda share: None, parent)
-
-
-def row_of(point: Point, swept: Collection[str]) -> dict[str, Any]:
-    """Return the row of a point: values of the swept keys, what was computed, how it went."""
-    summary = read_summary(point.folder)
-    done, seconds = summary["status"] == "done", summary.get("timings", {}).get("total", 0.0)
-    went = {"status": summary["status"], "reason": "" if done else summary["failure"]["what"], "seconds": seconds}
-    found = quantities(summary) if done else {}
-    return {**{k: v for k, v in point.values.items() if k in swept}, **found, **went, "folder": point.folder.name}

@@ -20,7 +20,6 @@ import numpy.typing as npt
 import ufl
 
 from rotfem.equations.nonlinear import BySpin, assembled
-from rotfem.equations.solutions import Linearised
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
@@ -258,10 +257,6 @@ class BorderedSystem:
     def imbalance(self) -> Array:
         """Return the owned part of −F at the state, and that of the hub."""
         return np.append(self.inner.imbalance(), -self.row.residual(self.inner.time))
-
-    def linearised(self) -> Linearised:
-        """Return the equations linearised about the state and time set."""
-        return Linearised(self)
 
     def local(self, x: Array) -> Array:
         """Return the local dof array of an owned one, the angle last, which the last process has."""

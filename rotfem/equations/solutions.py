@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from rotfem.numerics.linear import ComplexSolver, DirectSolver, SingularSolver, combine, is_regular
+from rotfem.numerics.linear import DirectSolver, SingularSolver, is_regular
 
 Array = npt.NDArray[Any]
 
@@ -19,8 +19,6 @@ class Solutions:
     """Solutions with the matrices of equations that have `residual`, `tangent` and `matrix` (see `System`).
 
     Attributes:
-        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, and `shifts`, `before`, `reference` of
-            its tangent.
         factored_before: factorisations of the same computation before this object was made.
     """
 
@@ -35,7 +33,6 @@ class Solutions:
     keeps_factor: bool
     model: Any
     reference: Any
-    factored: dict[str, Any] | None = None
     factored_before = 0
     _state: tuple[Array, ...]
     _solver: DirectSolver | None
@@ -46,10 +43,6 @@ class Solutions:
         started = perf_counter()
         b = self.residual()
         A, changed = self.tangent(*shifts, before)
-        if changed and self.keeps_factor:
-            q, v, a = (x.copy() for x in self._state)
-            known = {"t": self.model.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
-            self.factored = {**known, "reference": self.reference}
         return self._timed(started, b, A, changed)
 
     def chord(self) -> Array:
@@ -65,21 +58,9 @@ class Solutions:
         self.seconds["solve"] += perf_counter() - assembled
         return dq
 
-    def refactor(self, known: dict[str, Any] | None) -> None:
-        """Compute the kept factor again from its data (see `factored`); do nothing of None."""
-        if known is not None:
-            self.count_rotations_from(known["reference"])
-            self.set_time(known["t"])
-            self.set_state(known["q"], known["v"], known["a"])
-            self.correction(known["shifts"], known["before"])
-
     def imbalance(self) -> Array:
         """Return the owned part of −F at the state, a copy."""
         return np.array(self.residual().array)
-
-    def linearised(self) -> Linearised:
-        """Return the equations linearised about the state and time set."""
-        return Linearised(self)
 
     def factor(self, A: Any, changed: bool = True) -> DirectSolver:
         """Return the solver of the system's tangent A, with a new factor where it has changed."""
@@ -134,39 +115,3 @@ class Solutions:
         K = self.matrix(1.0, 0.0, 0.0, 1.0)
         K.scale(1e-9 * M.norm() / K.norm())
         return SingularSolver(M, K), massless
-
-
-class Linearised:
-    """M, C and K of a system at the state and time set, and solutions with K + s C + s² M for several s.
-
-    Schemes with coupled stages solve with one such matrix for each eigenvalue of their coefficients, complex ones among
-    them. The matrices are kept over steps of any length while iterations converge.
-
-    Attributes:
-        reference: what the rotations of the state are counted from.
-        serves: whether further steps may be solved with them.
-    """
-
-    def __init__(self, system: Any):
-        self.system, self.reference, self.serves = system, system.reference, True
-        self._matrices = tuple(reversed(system.with_hub(system.held.mass_damping_stiffness())))
-        self._shift: float | None = None
-        self._real_matrix = self._matrices[0].duplicate()
-        self._real = DirectSolver(self._real_matrix)
-        self._complex = ComplexSolver(self._matrices)
-        self._b = self._real_matrix.createVecLeft()
-
-    def take(self, shifts: tuple[float, complex]) -> None:
-        """Factorise with a real and a complex s (1/s), unless the factors at hand are those."""
-        if self._shift == shifts[0]:
-            return
-        s, z = shifts
-        self._real.refresh(combine(self._real_matrix, list(self._matrices), np.array([1.0, s, s * s])))
-        self._complex.factor((1.0, z, z * z))
-        self._shift = s
-
-    def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
-        """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
-        rows = len(self._b.array)
-        self._b.array[:] = real[:rows]
-        return self.system.local(self._real.solve(self._b)), self.system.local(self._complex.solve(complex_[:rows]))

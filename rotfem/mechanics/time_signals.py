@@ -2,21 +2,24 @@
 
 Speed, base acceleration, torque and loads are signals, smooth between their knots. At a knot a signal has two values:
 that of the step that ends, t⁻, and that of the step that starts, t⁺. If knots are closer than steps, a signal f is
-replaced over a step [a, b] by the straight line with its mean and first moment,
+replaced over a step [a, b] by the polynomial with its first moments,
 
-    f̄(t) = ∫ f(s) ds / h + 12 (t − m)/h³ ∫ (s − m) f(s) ds,    h = b − a,    m = (a + b)/2,
+    f̄(t) = Σ_k (2k + 1)/h P_k(x(t)) ∫ P_k(x(s)) f(s) ds,    x(t) = (2t − a − b)/h,    h = b − a,    k = 0 … n,
 
-its best approximation in the sense of least squares, with the impulse of f.
+P_k those of Legendre: its best approximation in the sense of least squares, with the impulse of f. A straight line
+(n = 1) serves schemes of second order, a cubic others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.legendre import leggauss, legvander
 
 from rotfem.mechanics.free_hub import Torque
 from rotfem.mechanics.loads import AnyLoad, PlaceLoad
@@ -29,8 +32,12 @@ Array = npt.NDArray[np.float64]
 #: Relative distance of two times below which they are equal.
 SAME = 1e-13
 
-#: Gauss points and weights on (0, 1): exact for polynomials of degree 5.
-POINTS, WEIGHTS = 0.5 + 0.5 * np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 18
+#: Begin and end (s) of a step, and the degree of the polynomials that replace signals in it.
+Fit = tuple[float, float, int]
+
+#: Gauss points and weights on (0, 1): exact for polynomials of degree 7, as a cubic times one.
+POINTS, WEIGHTS = (x / 2 for x in leggauss(4))
+POINTS = POINTS + 0.5
 
 
 @dataclass
@@ -39,11 +46,21 @@ class View:
 
     Attributes:
         side: −1 just before the time asked for, 1 just after it, 0 at it.
-        line: begin and end (s) of the step over which they are replaced by straight lines; None for their values.
+        line: step over which they are replaced by polynomials; None for their values.
     """
 
     side: int = 0
-    line: tuple[float, float] | None = None
+    line: Fit | None = None
+
+    @contextmanager
+    def as_in(self, other: View) -> Iterator[None]:
+        """Evaluate signals as another view does, within the context."""
+        before = self.side, self.line
+        self.side, self.line = other.side, other.line
+        try:
+            yield
+        finally:
+            self.side, self.line = before
 
 
 @dataclass
@@ -67,7 +84,7 @@ class TimeSignal:
     many: Callable[[Array], Array] | None = None
     known: bool = True
     continuous: bool = False
-    _line: tuple[tuple[float, float], Any, Any] | None = None
+    _fit: tuple[Fit, Array] | None = None
 
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
@@ -75,26 +92,31 @@ class TimeSignal:
             return self.many(t)
         return np.array([np.atleast_1d(self.at(float(s))) for s in t], dtype=float).reshape(len(t), -1)
 
-    def on_line(self, t: float, begin: float, end: float) -> Any:
-        """Return f̄(t) of the step between two times (s), as a scalar or shape (components,) as `at` does."""
+    def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
+        """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
         middle, h = 0.5 * (begin + end), end - begin
-        if self._line is None or self._line[0] != (begin, end):
+        if self._fit is None or self._fit[0] != (begin, end, degree):
             points = np.union1d(self.knots, self.smooth)
             edges = np.array([begin, *points[(points > begin) & (points < end)], end])
             s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
-            weights, f = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h, self.values(s)
-            mean, slope = weights @ f, 12 / h**2 * (weights * (s - middle)) @ f
-            scalar = np.ndim(self.at(middle)) == 0
-            self._line = (begin, end), *((float(mean[0]), float(slope[0])) if scalar else (mean, slope))
-        _, mean, slope = self._line
-        return mean + (t - middle) * slope
+            weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
+            moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
+            self._fit = (begin, end, degree), (2 * np.arange(degree + 1) + 1)[:, None] * moments
+        return legvander((t - middle) * (2 / h), degree) @ self._fit[1]
+
+    def deviation(self, t: Array, begin: float, end: float, degree: int) -> Array:
+        """Return |f − f̄| at times (n,) of a step, as parts of the largest |f| there."""
+        f = self.values(t * (1 - SAME))
+        largest = float(np.linalg.norm(f, axis=1).max())
+        return np.asarray(np.linalg.norm(f - self.fitted(t, begin, end, degree), axis=1) / (largest or 1.0))
 
     def seen(self, view: View) -> Callable[[float], Any]:
         """Return the signal as a function of time, evaluated as a view says."""
 
         def at(t: float) -> Any:
             if view.line is not None:
-                return self.on_line(t, *view.line)
+                value = self.fitted(np.array([t]), *view.line)[0]
+                return float(value[0]) if np.ndim(self.at(t)) == 0 else value
             return self.at(t + view.side * SAME * (abs(t) or SAME)) if view.side else self.at(t)
 
         return at

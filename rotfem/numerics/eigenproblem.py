@@ -152,12 +152,13 @@ def mirror_error(values: Array) -> float:
 
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
     """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
-    from scipy.optimize import linear_sum_assignment  # slow to load
-
     distance = np.abs(values[None, :] - wanted[:, None])
     index = np.argmin(distance, axis=1)
-    rows, columns = linear_sum_assignment(distance)
-    index[rows] = columns
+    if len(np.unique(index)) < len(index):
+        from scipy.optimize import linear_sum_assignment  # slow to load
+
+        rows, columns = linear_sum_assignment(distance)
+        index[rows] = columns
     return vectors[:, index]
 
 
@@ -165,10 +166,10 @@ def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
 BACKWARD_TOLERANCE = 1e-8
 
 #: Part of the median |λ| below which an eigenvalue counts as zero where zero is an eigenvalue.
-ZERO = 1e-3
+ZERO_EIGENVALUE = 1e-3
 
 #: Relative distance at which two eigenvalues count as equal, or a real part as zero.
-SAME = 1e-6
+EQUAL_EIGENVALUES = 1e-6
 
 
 @dataclass
@@ -321,7 +322,7 @@ class Pencil(Sendable):
         except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
             pairs = self._solve(count, 0.1 * self._smallest)
         lam = pairs.values
-        opposite = np.abs(lam[1:] + lam[:-1]) < ZERO * np.abs(lam[1:])
+        opposite = np.abs(lam[1:] + lam[:-1]) < ZERO_EIGENVALUE * np.abs(lam[1:])
         return pairs.select(np.flatnonzero(np.append(True, ~opposite | (pairs.bounds[1:] < 1.0))[: len(lam)]))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
@@ -338,7 +339,7 @@ class Pencil(Sendable):
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
-        small = ZERO * self._smallest if target > 0.0 else 0.0
+        small = ZERO_EIGENVALUE * self._smallest if target > 0.0 else 0.0
         if self.damped and heavily_damped(values[self.stiff(right) & (np.abs(values) > small)]):
             return self._damped(count, target)
         if self.conservative:
@@ -377,7 +378,7 @@ class Pencil(Sendable):
         start, more = shapes / d[:, None], min(2 * count, count + MORE)
         values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit)
         vectors = d[:, None] * right, d[:, None] * left
-        return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
+        return self._checked(self.unit * values, vectors, errors, ZERO_EIGENVALUE * self.unit if target > 0.0 else 0.0)
 
     def _checked(self, values: Array, vectors: tuple[Array, Array], errors: Array, small: float) -> Eigenpairs:
         """Return pairs with their bounds, from right and left vectors.

@@ -12,37 +12,27 @@ import numpy as np
 from rotfem.errors import ComputationError
 
 
-class OldFactor:
+class Factor:
     """Decides for every iteration whether the factor of an earlier tangent serves, or a new one pays.
 
     Increments with an old factor shrink by a constant rate, often by two in turn. The rate of the last two says how
-    many more there will be. Where these would cost more than a tangent and its factor, it is made anew on the way.
+    many more there will be. Where these would cost more than a tangent and its factor, it is made anew. After three on
+    the way every iteration makes its own.
 
     Args:
         serves: whether there is one for the first.
-
-    Attributes:
-        made: tangents that were made on the way.
-        used: iterations with the last factor.
     """
 
     def __init__(self, serves: bool):
         self.serves = serves
-        self.made, self.used = 0, 0
-        self._sizes: list[float] = []
+        self._made, self._sizes = 0, list[float]()
 
-    @property
-    def hopeless(self) -> bool:
-        """Whether new tangents have not helped."""
-        return self.made > 3
-
-    def took(self) -> bool:
-        """Return whether the iteration that begins is one with the factor at hand, and count it."""
-        old = self.serves
-        if not old:
-            self.made, self.used, self._sizes, self.serves = self.made + 1, 0, [], True
-        self.used += 1
-        return old
+    def renewed(self) -> bool:
+        """Return whether the iteration that begins makes a new one, and count it."""
+        if self.serves:
+            return False
+        self._made, self._sizes, self.serves = self._made + 1, [], self._made < 3
+        return True
 
     def judge(self, size: float, wanted: float) -> None:
         """Take note of the size of an increment, which is to become as small as is wanted."""
@@ -92,42 +82,51 @@ class Newton:
         """Return the control that settings (`increment_tolerance`, `max_iterations`) ask for."""
         return cls(settings.increment_tolerance, settings.max_iterations)
 
-    def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: OldFactor | None = None) -> int:
-        """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.
+    def solve(
+        self,
+        increment: Callable[[bool], tuple[float, bool]],
+        size: Callable[[], float],
+        factor: Factor | None = None,
+    ) -> int:
+        """Repeat `increment` until it is small; return the number of iterations.
 
         Args:
-            increment: one linear solve; applies it and returns its scaled maximum norm.
+            increment: one linear solve, with a new tangent or with the factor at hand; applies it and returns its
+                scaled maximum norm, and whether it is exact.
             size: scaled maximum norm of the unknown, against which round-off is judged.
-            chord: who decides which increments are made with an old factor, if any are; these shrink by a constant
+            factor: what decides which increments are made with an old factor; None of none. Those shrink by a constant
                 rate only, and nothing is predicted from the first.
 
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
         """
         self.diverging = self.wandered = False
-        previous, first, stalled = np.inf, np.inf, 0
-        for k in range(1, self.max_iterations + 1):
-            d = increment()
+        previous, first, stalled, k, tangents = np.inf, np.inf, 0, 0, 0
+        while tangents < self.max_iterations and k < 3 * self.max_iterations:
+            k += 1
+            new = factor is None or factor.renewed()
+            tangents += new
+            d, exact = increment(new)
             self.iterations += 1
             if not math.isfinite(d):
                 raise ComputationError(f"Newton iteration {k} gave an increment that is not finite")
+            if exact:
+                return k
             if k == 1:
                 first = d
-            if k == 2 and first > 0 and chord is None:
+            if k == 2 and first > 0 and factor is None:
                 self._kappa = max(0.5 * self._kappa if math.isfinite(self._kappa) else 0.0, d / first**2)
                 self._longest = max(first, 0.5 * self._longest)
-            if chord is not None:
+            if factor is not None:
                 # Newton's last increment leaves an error of its square; those with an old factor leave a part of
                 # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
                 enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
-                chord.judge(d, enough)
+                factor.judge(d, enough)
             elif d <= self.tolerance or ((k == 1 or self.foreseeing) and self._successor(d) <= self.tolerance):
                 return k
-            stalled = stalled + 1 if d > 0.3 * previous and (chord is None or not chord.serves) else 0
-            if chord is not None and chord.hopeless:
-                raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
+            stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
                 self.roundoff = max(self.roundoff, d)
                 return k
@@ -137,7 +136,7 @@ class Newton:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")
             previous = d
         raise ComputationError(
-            f"Newton did not converge in {self.max_iterations} iterations: last increment {previous:.1e} (scaled), "
+            f"Newton did not converge in {k} iterations: last increment {previous:.1e} (scaled), "
             f"wanted {self.tolerance:.0e}"
         )
 

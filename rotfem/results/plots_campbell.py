@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, ShownUnits, label
@@ -80,7 +78,7 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     captions = [label(seen, units.frequency), "damping ratio (%)"]
     for panel, caption in zip(panels, captions, strict=False):
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
-        entries = marks(panel, result, units, last)
+        marks(panel, result, units, last)
     for b in shown:
         axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
         axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
@@ -94,7 +92,7 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
         axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
-    entries += crossings(axis, result, units, fixed)
+    crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
     name_lines(axis, shown, rays, heights[0])
@@ -102,18 +100,19 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
-    entries += line_entries(shown)
+    name_styles(axis, shown)
+    entries = axis.get_legend_handles_labels()
     letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
     right = 0.35 + max(0.068 * letters[0], 0.06 * letters[1])
     over = 0.4 + max(0.12 * len(names), 0.2 * any(slope * last > top for _, slope in rays))
-    below = 0.65 + 0.2 * -(-len(entries) // 3)
+    below = 0.65 + 0.2 * -(-len(entries[0]) // 3)
     height = over + sum(heights) + 0.2 * damped + below
     figure.set_figheight(height)
     for panel, own, under in zip(panels, heights, [below + sum(heights[1:]) + 0.2 * damped, below], strict=False):
         panel.set_position((LEFT / WIDTH, under / height, 1.0 - (LEFT + right) / WIDTH, own / height))
     figure.suptitle(result.title, fontsize=11, y=1.0 - 0.08 / height, va="top")
-    if entries:
-        figure.legend(handles=entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
+    if entries[0]:
+        figure.legend(*entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
@@ -174,53 +173,47 @@ def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
         shown = found
 
 
-def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) -> list[Any]:
-    """Draw rated speed, operating range and ranges of instability as far as they are given; return legend entries."""
-    summary, entries = result.summary, list[Any]()
+def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) -> None:
+    """Draw rated speed, operating range and ranges of instability as far as they are given."""
+    summary = result.summary
     if "operating" in summary:
         low, high = units.speeds(summary["operating"])
-        axis.axvspan(low, high, color="0.9", lw=0.0, zorder=0)
-        entries.append(Patch(color="0.9", label=f"operating range, {low:.5g} to {high:.5g} {units.speed}"))
+        said = f"operating range, {low:.5g} to {high:.5g} {units.speed}"
+        axis.axvspan(low, high, color="0.9", lw=0.0, zorder=0, label=said)
     if "rated" in summary:
         rated = float(units.speeds(summary["rated"]))
-        style: dict[str, Any] = {"color": "k", "lw": 1.0, "ls": (0, (6, 2, 1, 2))}
-        axis.axvline(rated, zorder=1, **style)
-        entries.append(Line2D([], [], label=f"rated speed, {rated:.5g} {units.speed}", **style))
+        dashes = (0, (6, 2, 1, 2))
+        axis.axvline(rated, zorder=1, color="k", lw=1.0, ls=dashes, label=f"rated speed, {rated:.5g} {units.speed}")
     for kind, color in (("dynamic instability", "C3"), ("static instability", "C1")):
-        ranges = [onset for onset in summary["instabilities"] if onset["kind"] == kind]
-        for onset in ranges:
-            end = last if onset["until"] is None else float(units.speeds(onset["until"]))
-            axis.axvspan(float(units.speeds(onset["speed"])), end, color=color, alpha=0.12, lw=0.0, zorder=0)
-        if ranges:
-            first = float(units.speeds(ranges[0]["speed"]))
-            entries.append(Patch(color=color, alpha=0.2, label=f"{kind} from {first:.5g} {units.speed}"))
-    return entries
+        said = kind
+        for onset in (onset for onset in summary["instabilities"] if onset["kind"] == kind):
+            first, until = float(units.speeds(onset["speed"])), onset["until"]
+            end = last if until is None else float(units.speeds(until))
+            said = f"{kind} from {first:.5g} {units.speed}" if said == kind else "_"
+            axis.axvspan(first, end, color=color, alpha=0.12, lw=0.0, zorder=0, label=said)
 
 
-def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool) -> list[Line2D]:
-    """Draw critical speeds, synchronous ones filled; return their legend entries."""
-    entries = []
+def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool) -> None:
+    """Draw critical speeds, synchronous ones filled."""
     for synchronous, name in ((True, "synchronous critical speed"), (False, "crossing with kΩ")):
         there = [c for c in result.critical_speeds if (c.kind != "per_rev") == synchronous]
-        if not there or (fixed and not synchronous):
-            continue
-        style: dict[str, Any] = {"marker": "o", "ls": "", "color": "k", "ms": 5 if synchronous else 4}
-        style |= {} if synchronous else {"mfc": "white"}
-        height = [seen_fixed(c) if fixed else c.frequency for c in there]
-        speeds, heights = units.speeds([c.speed for c in there]), units.frequencies(height)
-        axis.plot(speeds, heights, **style, clip_on=False, zorder=4)
-        entries.append(Line2D([], [], label=name, **style))
-    return entries
+        if there and (synchronous or not fixed):
+            height = [seen_fixed(c) if fixed else c.frequency for c in there]
+            speeds, heights = units.speeds([c.speed for c in there]), units.frequencies(height)
+            style: dict[str, Any] = {"ms": 5} if synchronous else {"ms": 4, "mfc": "white"}
+            axis.plot(speeds, heights, "ko", label=name, clip_on=False, zorder=4, **style)
 
 
-def line_entries(branches: list[Branch]) -> list[Line2D]:
-    """Return the legend entries of dashes, crosses and broad lines, as far as there are some."""
-    kinds = (
+def name_styles(axis: Axes, branches: list[Branch]) -> None:
+    """Name dashes, crosses and broad lines in the legend, as far as there are some."""
+    kinds: tuple[tuple[bool, str, dict[str, Any]], ...] = (
         (any(b.style["ls"] == "--" for b in branches), "backward", {"color": "0.3", "ls": "--"}),
         (any(np.any(b.unstable) for b in branches), "grows", {"color": "C3", "ls": "", "marker": "x"}),
         (any(np.any(b.doubtful) for b in branches), "ambiguous", {"color": "0.6", "lw": 7, "alpha": 0.5}),
     )
-    return [Line2D([], [], label=name, **style) for there, name, style in kinds if there]
+    for there, name, style in kinds:
+        if there:
+            axis.plot([], [], label=name, **style)
 
 
 def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], height: float) -> None:

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 
-from rotfem.results.columns import ZERO, Columns, ShownUnits, described, label, label_of, largest
+from rotfem.results.columns import ZERO, Columns, ShownUnits, label, label_of, largest
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result, data_url
@@ -37,34 +37,17 @@ MOST_ROWS = 2000
 #: Largest displacement of a mode that moves, part of the length.
 AMPLITUDE = 0.15
 
-#: What a summary says first ↦ what it is called.
-FACTS = {
-    "theory": "theory",
-    "about": "modes about the state",
-    "frame": "frame",
-    "effects": "effects",
-    "type": "structure",
-    "length": "length (m)",
-    "mass": "mass (kg)",
-    "elements": "elements",
-    "dofs": "unknowns",
-    "steps": "time steps",
-    "speeds_solved": "speeds solved",
-    "frequencies": "frequencies",
-    "output": "output",
-    "accuracy": "accuracy wanted",
-    "truth": "theory of the reference",
-    "settings": "settings measured",
-    "ranks": "processes",
-}
+#: What a summary says first, and what is called otherwise there.
+FACTS = (
+    *("theory", "about", "frame", "effects", "type", "length", "mass", "elements", "dofs", "steps", "speeds_inserted"),
+    *("frequencies", "output", "accuracy", "truth", "ranks"),
+)
+CALLED = {"type": "structure", "length": "length (m)", "mass": "mass (kg)", "dofs": "unknowns", "ranks": "processes"}
 
-#: Contribution to an error ↦ what it means.
-MEANING = {
-    "time": "finite time steps; a shorter time.step or a smaller time.tolerance lessens it",
-    "space": "finite elements; more mesh.elements or a higher mesh.degree lessen it",
-    "model": "the theory, compared with the exact strains; a richer model.theory lessens it",
-    "round_off": "arithmetic with 16 digits; no setting lessens it",
-    "total": "all of them together",
+#: Figure of merit of a column ↦ its heading.
+MERITS = {
+    **{"final": "at the end", "min": "smallest", "min_time": "smallest at t (s)"},
+    **{"max": "largest", "max_time": "largest at t (s)"},
 }
 
 
@@ -93,7 +76,7 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
         section("Figures", (hint if live else "") + parts),
         section("Modes in motion", cards),
         section("Tables", "".join(table(*entry) for entry in tables(result))),
-        section("How exact it is", error_table(summary)),
+        section("Estimated error", error_table(summary)),
         section("Scene", scene(summary, drawing)),
         section("Made with", facts_list(summary["versions"]) + folded("summary.json", json_text(dict(summary)))),
     ]
@@ -124,7 +107,7 @@ def facts(summary: Mapping[str, Any]) -> str:
     units, found = ShownUnits.of(summary), dict[str, Any]()
     if isinstance(summary.get("speed"), float):
         found[f"speed ({units.speed})"] = float(units.speeds(summary["speed"]))
-    found |= {said: summary[key] for key, said in FACTS.items() if summary.get(key) not in (None, [])}
+    found |= {CALLED.get(key, label_of(key)): summary[key] for key in FACTS if summary.get(key) not in (None, [])}
     if (total := summary.get("error", {}).get("total")) is not None:
         found["error, estimated"] = f"{100 * total:.2g} %"
     found["computing time (s)"] = summary.get("timings", {}).get("total")
@@ -148,22 +131,14 @@ def messages(summary: Mapping[str, Any]) -> str:
 
 def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """Yield title and rows of what a summary has in lists, of figures and peaks, and of the settings of a study."""
-    summary, units = result.summary, ShownUnits.of(result.summary)
-    if summary.get("kind") is not None:
-        figures: dict[str, dict[str, Any]] = {}
-        for key, value in summary.get("figures", {}).items():
-            for ending in ("_final", "_min_time", "_max_time", "_min", "_max"):
-                if key.endswith(ending):
-                    name = key.removesuffix(ending)
-                    row = figures.setdefault(name, {"quantity": described(name)[0], "unit": described(name)[1]})
-                    row[ending[1:].replace("_time", " at t (s)")] = value
-                    break
-        yield "Largest and last values", list(figures.values())
-    if "peaks" in summary:
-        yield "Peaks", [{"output": label(name), **peak} for name, peak in summary["peaks"].items()]
+    summary, merits = result.summary, result.summary.get("figures", {})
+    names = [key.removesuffix("_final") for key in merits if key.endswith("_final")]
+    found = [{said: merits.get(f"{name}_{key}") for key, said in MERITS.items()} for name in names]
+    yield "Largest and last values", [{"quantity": label(n)} | row for n, row in zip(names, found, strict=True)]
+    yield "Peaks", [{"output": label(name), **peak} for name, peak in summary.get("peaks", {}).items()]
     for key, value in summary.items():
         if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
-            yield key.replace("_", " ").capitalize(), units.rows(value)
+            yield key.replace("_", " ").capitalize(), ShownUnits.of(summary).rows(value)
     if summary["command"] == "cost":
         yield "Settings", list(getattr(result, "rows", ()))
 
@@ -215,15 +190,12 @@ def shown(value: Any) -> str:
 
 
 def error_table(summary: Mapping[str, Any]) -> str:
-    """Return the contributions to the error and what they mean; nothing where no error was estimated."""
-    error = summary.get("error", {})
-    rows = [
-        {"contribution": name.replace("_", "-"), "relative error": error[name], "what it is": meaning}
-        for name, meaning in MEANING.items()
-        if name in error
-    ]
-    scale = f"<p>Relative to {error['scale']:.6g} m, the largest displacement.</p>" if error.get("scale") else ""
-    return table("Estimated error", rows) + scale if rows else ""
+    """Return the contributions to the error; nothing where no error was estimated."""
+    parts = {name: value for name, value in summary.get("error", {}).items() if name not in ("scale", "time_at")}
+    scale = summary.get("error", {}).get("scale")
+    return table("", [{"of": name.replace("_", "-"), "relative error": value} for name, value in parts.items()]) + (
+        f"<p>Relative to {scale:.6g} m, the largest displacement.</p>" if scale else ""
+    )
 
 
 def scene(summary: Mapping[str, Any], drawing: Figure | None) -> str:

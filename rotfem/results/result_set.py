@@ -42,11 +42,12 @@ RESULTS = re.compile(
     r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns)\.csv|"
     r"(history|loads|shape|stations|resultants|modes|mode_\d+|response|campbell_fixed)\.png|"
     r"(campbell|explain|cost|check|compare|sweep|response)\.(csv|json|png)|modes\.json|report\.html|sweep\.nc|"
-    r"(mode_\d+\.gif)|state_space\.npz|[MCK]\.(mtx|npz)|(fields|modes|stations_line|stations|checkpoint)\.\w+"
+    r"mode_\d+\.gif|state_space\.npz|[MCK]\.(mtx|npz)|(fields|modes|stations_line)\.(bp|xdmf|h5)|"
+    r"(stations|checkpoint)\.(h5|npz)"
 )
 
-#: Names of what `cost` and `sweep` go on with, which stays.
-KEPT = ("cost.jsonl", "points")
+#: Names of what `campbell` and `sweep` go on with, which stays.
+KEPT = ("speeds.npz", "points")
 
 
 class ResultFolder(AbstractContextManager["ResultFolder"]):

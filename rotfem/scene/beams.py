@@ -17,7 +17,6 @@ from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
-from rotfem.scene.span_tables import symmetric
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
 from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
@@ -35,6 +34,7 @@ from rotfem.scene.values import (
     Vector,
     check_profile_length,
     on_span,
+    symmetric,
 )
 
 #: A moment of inertia or a tensor, 3×3.

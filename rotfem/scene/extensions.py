@@ -11,12 +11,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
-
 from rotfem import registry
 from rotfem.errors import SceneError, shown
 from rotfem.scene.files import Unreadable, read_bytes
-from rotfem.scene.table import SceneModel
+from rotfem.scene.table import LISTED, SceneModel
 
 #: Resolved paths of the files that have been run.
 _LOADED: set[Path] = set()
@@ -29,7 +27,7 @@ class Extensions(SceneModel):
         load: paths of Python files, from the folder of the scene, that are run before the scene is read.
     """
 
-    load: Annotated[tuple[str, ...], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)] = ()
+    load: Annotated[tuple[str, ...], LISTED] = ()
 
 
 def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_
 
 from rotfem.errors import SceneError
 from rotfem.scene.files import is_path, read_rows
-from rotfem.scene.table import SceneModel, in_units, problem, problems_at, unit
+from rotfem.scene.table import LISTED, SceneModel, in_units, problem, problems_at, unit
 from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, on_span
 
 
@@ -369,12 +369,7 @@ class Pressure(SpanLoad):
 
 
 #: A place along a beam, or (x, y) on a plate.
-Place = Annotated[
-    tuple[Number, ...],
-    Field(max_length=2),
-    BeforeValidator(lambda given: given if isinstance(given, list | tuple) else (given,)),
-    unit("m"),
-]
+Place = Annotated[tuple[Number, ...], Field(max_length=2), LISTED, unit("m")]
 
 
 class PointLoad(SceneModel):

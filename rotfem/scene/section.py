@@ -10,31 +10,91 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import AfterValidator, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationInfo
 
 from rotfem import registry
+from rotfem.scene.files import FROM_FILE, existing_file, read_table
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
-from rotfem.scene.span_tables import Center, Matrices, file_columns, symmetric
-from rotfem.scene.table import SceneModel, Way, along, as_name, choose_way, problem, problems_at
+from rotfem.scene.table import (
+    SceneModel,
+    Way,
+    along,
+    as_name,
+    choose_way,
+    did_you_mean,
+    problem,
+    problems_at,
+    unit,
+)
 from rotfem.scene.values import (
     ROUND_OFF,
+    UPPER,
     Array,
     NonNegative,
     Number,
     Positive,
     Profile,
+    Rows,
     ShearCorrection,
+    T,
+    check_increasing,
+    check_start,
     evaluate,
     is_table,
+    symmetric,
+    symmetric_matrices,
 )
 
 PoissonProfile = Profile[Annotated[float, Field(strict=True, gt=-1, le=0.5)]]
+
+# --- points and matrices over the span --------------------------------------------------------------------------------
+
+#: Keys of a section that hold matrices, and points.
+MATRICES, POINTS = ("stiffness", "mass"), ("mass_center", "shear_center", "tension_center")
+
+Point = tuple[Number, Number]
+#: A point (y, z) or a matrix for the whole span, or rows (x, point or matrix).
+OverSpan = Annotated[
+    Annotated[T, Tag("<one>")] | Annotated[tuple[tuple[Number, T], ...], Tag("<rows>")],
+    Discriminator(lambda value: "<rows>" if is_table(value) else "<one>"),
+    AfterValidator(lambda value: check_start(check_increasing(value)) if is_table(value) else value),
+]
+
+
+def _points(value: Any) -> Any:
+    """Return rows [x, y, z] as [x, [y, z]]."""
+    return _split(value, {3: lambda point: point})
+
+
+def _matrices(value: Any) -> Any:
+    """Return rows of x and the 36 entries of a matrix row by row, or the 21 of its upper triangle, as [x, matrix]."""
+    return _split(value, {37: _matrix, 22: _matrix})
+
+
+def _split(value: Any, ways: Mapping[int, Callable[[Any], Any]]) -> Any:
+    if not isinstance(value, list | tuple):
+        return value
+    rows = [row if isinstance(row, list | tuple) else () for row in value]
+    return [(row[0], ways[len(row)](row[1:])) if len(row) in ways else value[i] for i, row in enumerate(rows)]
+
+
+def _matrix(entries: Sequence[Any]) -> list[list[Any]]:
+    """Return a matrix (6, 6) of its 36 entries, or of the 21 of its upper triangle."""
+    at = np.arange(36).reshape(6, 6) if len(entries) == 36 else symmetric_matrices(np.arange(21)).astype(int)
+    return [[entries[i] for i in row] for row in at]
+
+
+Center = Annotated[OverSpan[Point], unit("m"), BeforeValidator(_points), FROM_FILE]
+Matrices = Annotated[OverSpan[Rows], BeforeValidator(_matrices), FROM_FILE]
+
+
+# --- what planar and spatial beams share ------------------------------------------------------------------------------
 
 
 class Section(SceneModel):
@@ -142,6 +202,32 @@ class Section(SceneModel):
             for name, values in asdict(self._geometry(np.array(self.knots))).items():
                 if name not in ("centroid", "shear_center") and not np.all(np.greater_equal(values, 0.0)):
                     raise problem("shape", self.shape, f"gives {name} = {np.min(values):g}; must be positive")
+
+
+def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
+    """Return the properties of a section from a file whose header names its columns."""
+    path = existing_file(value, info)
+    names, rows = read_table(path)
+    if not names or names[0] != "x":
+        first = f' "{names[0]}"' if names else ""
+        raise problem("", str(path), f"its first row must name the columns, x first, not{first or ' numbers'}")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise problem("", str(path), f'column "{twice}" stands twice')
+    column = dict(zip(names, np.array(rows).T.tolist(), strict=True))
+    x = column.pop("x")
+    out: dict[str, Any] = {}
+    entries = {key: [f"{key}_{place}" for place in UPPER] for key in MATRICES}
+    entries |= {key: [f"{key}_y", f"{key}_z"] for key in POINTS}
+    for key, parts in entries.items():
+        given = {name: column.pop(name) for name in parts if name in column}
+        if given:
+            out[key] = list(zip(x, *(given.get(name, [0.0] * len(x)) for name in parts), strict=True))
+    for name in column:
+        if name.startswith(tuple(f"{key}_" for key in entries)) and name != "mass_per_length":
+            hint = did_you_mean(name, [part for parts in entries.values() for part in parts])
+            raise problem("", str(path), f'unknown column "{name}"; {hint}upper triangles only, as stiffness_12')
+    return out | {name: list(zip(x, values, strict=True)) for name, values in column.items()}
 
 
 def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:

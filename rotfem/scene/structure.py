@@ -8,11 +8,11 @@ from inspect import Parameter, signature
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag
+from pydantic import ConfigDict, Discriminator, Field, Tag
 
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
-from rotfem.scene.table import SceneModel, did_you_mean, problem, unit
+from rotfem.scene.table import LISTED, SceneModel, did_you_mean, problem, unit
 from rotfem.scene.values import NonNegative
 
 
@@ -77,9 +77,7 @@ for _name, _home in (
 
 Ratio = Annotated[float, Field(strict=True, ge=0, lt=1)]
 #: Ratios in the order of frequency; a number is one.
-Ratios = Annotated[
-    tuple[Ratio, ...], BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value])
-]
+Ratios = Annotated[tuple[Ratio, ...], LISTED]
 
 
 def _kind_of_ratios(value: Any) -> str:

@@ -101,20 +101,26 @@ def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) 
     return least > 1e-12 if definite else least >= -slack
 
 
-def check_symmetric(rows: Matrix, size: int, definite: bool, where: str = "") -> Matrix:
-    """Return a symmetric matrix as a tuple of rows.
+def symmetric(size: int, definite: bool) -> AfterValidator:
+    """Return what refuses matrices, of a table too, that are not symmetric and positive definite or semidefinite.
 
-    Raise on another size, a lack of symmetry of 1e-9 of the largest entry, or one that is not positive (semi)definite.
+    Symmetry is to 1e-9 of the largest entry.
     """
-    shape = f"{where}must be a symmetric {size}×{size} matrix"
-    if [len(row) for row in rows] != [size] * size:
-        raise problem("", None, shape)
-    matrix = np.array(rows)
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUND_OFF * np.max(np.abs(matrix))):
-        raise problem("", None, f"{shape}; it is not symmetric")
-    if not is_positive(matrix, definite):
-        raise problem("", None, f"{shape}, positive {'definite' if definite else 'semidefinite'}")
-    return rows
+
+    def check(value: Any) -> Any:
+        table = is_table(value) and isinstance(value[0][1], tuple)
+        for x, rows in value if table else [(None, value)]:
+            shape = f"{'' if x is None else f'at x = {x:g} it '}must be a symmetric {size}×{size} matrix"
+            if [len(row) for row in rows] != [size] * size:
+                raise problem("", None, shape)
+            matrix = np.array(rows)
+            if not np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUND_OFF * np.max(np.abs(matrix))):
+                raise problem("", None, f"{shape}; it is not symmetric")
+            if not is_positive(matrix, definite):
+                raise problem("", None, f"{shape}, positive {'definite' if definite else 'semidefinite'}")
+        return value
+
+    return AfterValidator(check)
 
 
 #: Rows and columns of the entries of the upper triangle of a 6×6 matrix, row by row, in names.

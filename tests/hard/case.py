@@ -16,10 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import tomli_w
 
-#: What can become of a case. The last three must not be.
-CLASSES = ("right", "warned", "refused", "failed", "wrong", "crashed", "endless")
-
-#: What each class means, for the page.
+#: What can become of a case, and what that means. The last three must not be.
 MEANINGS = {
     "right": "the value is within the tolerance of the reference",
     "warned": "computed, and the summary says in these words what is doubtful",

@@ -43,7 +43,6 @@ LEVELS: dict[str, dict[str, float]] = {
         "generalised_alpha": 3,
         "newmark": 2,
         "esdirk4": 2,
-        "radau5": 2,
         "energy_conserving": 2,
         "tolerance": 1,
         "accuracy": 0.1,
@@ -68,7 +67,7 @@ ACTIVE: Levels = {
 }
 
 LINEAR = ("linear", "consistent_linear", "von_karman_linear")
-HISTORIES = ("generalised_alpha", "newmark", "esdirk4", "radau5", "energy_conserving", "tolerance")
+HISTORIES = ("generalised_alpha", "newmark", "esdirk4", "energy_conserving", "tolerance")
 #: What pairs are not enough for: rotations that are counted afresh within a step, of some unknowns only.
 _SOME: Levels = {"unknowns": ("left out",)}
 ALSO: list[Levels] = [

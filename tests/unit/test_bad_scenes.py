@@ -133,6 +133,7 @@ loads.tip_force.harmonic={amplitude=['a',1], frequency=1} -> @loads.tip_force.ha
 structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
 structure.section.EA=nofile.csv -> file not found
+time={end=1.0, step=1e-20} -> @time.step round-off
 [spatial]
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
@@ -143,6 +144,7 @@ structure.hub_radius=1; structure.hub_offset=[1,0,0] -> either
 structure.supports=[{x=0}] -> @structure.supports.0.stiffness give stiffness
 structure.section.mass_center=[0.1] -> more entries
 structure.line=[[0,0,0],[1,0,0]]; structure.length=3 -> @structure.length arc length
+structure.tip_inertia=[[1,2],[2,1]] -> symmetric 3×3
 structure.masses=[{x=9, mass=1}] -> @structure.masses.0.x from 0 to the length
 [plate]
 model.frame='inertial' -> planar_beam

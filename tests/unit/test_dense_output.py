@@ -8,7 +8,6 @@ from mpi4py import MPI
 
 from rotfem.analysis.dense_output import RowTimes, between, multiples
 from rotfem.analysis.schemes import State
-from rotfem.analysis.time_grid import Leg
 
 
 def of_polynomial(p: np.polynomial.Polynomial, t: float) -> State:
@@ -50,7 +49,7 @@ def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
     rows, found, t = RowTimes(multiples(0.25, 2.1), 4, MPI.COMM_SELF), [], 0.0
     for h in (0.1, 0.15, 0.9, 0.05, 0.9):
         old, new = of_polynomial(p, t), of_polynomial(p, t := t + h)
-        rows(old, new, Leg(t, h))
+        rows(old, new)
         found += rows.taken()
     np.testing.assert_allclose([state.t for state in found], [*np.arange(0.25, 2.1, 0.25), 2.1], atol=1e-12)
     assert found[0].q[0] == pytest.approx(0.25)

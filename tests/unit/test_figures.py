@@ -68,9 +68,8 @@ def test_a_campbell_diagram_can_be_read(frequencies: dict[str, float], orders: l
     figure = campbell_figure(diagram(frequencies, 0.01, orders=orders, instabilities=onsets, ambiguous=doubts, **marks))
     check(figure)
     assert figure.axes[1].get_ylabel() == "damping ratio (%)"
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[:2] == ["operating range, 6.9 to 12.1 rpm", "rated speed, 12.1 rpm"]
-    assert texts[-1] == "ambiguous"
+    texts = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"operating range, 6.9 to 12.1 rpm", "rated speed, 12.1 rpm", "ambiguous"} <= texts
     assert len(campbell_figure(diagram(frequencies, 1e-10)).axes) == 1, "round-off is no damping"
 
 
@@ -201,7 +200,7 @@ def test_a_response(omega: Any) -> None:
     direct = np.column_stack([1e-14 * one, one, 0.3 * one, one, 1e6 * one, one, one, one])
     figure = ResponseResult(said(outputs=outputs, speed=6.0), [{"frequency": w} for w in omega], direct).plot()
     check(figure)
-    amplitudes = figure.axes[::2]
+    amplitudes = figure.axes[:4]
     assert [len(axes.get_lines()) for axes in amplitudes] == [2, 1, 2, 1]
     assert {line.get_marker() == "." for line in amplitudes[0].get_lines()} == {len(omega) == 1}
     assert figure.get_suptitle().endswith(ZERO + "tip u₁")

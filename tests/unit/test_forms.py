@@ -17,7 +17,7 @@ from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms
-from rotfem.numerics.forms import SAME, Assembler
+from rotfem.numerics.forms import SAME_PATTERN, Assembler
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> Non
         A = assembled(form)
         np.testing.assert_array_equal(A[:, :], exact[:, :])
         assert A.getInfo()["nz_used"] == assembled.pattern.getInfo()["nz_used"]
-        A.axpy(-1.0, assembled(form), SAME)
+        A.axpy(-1.0, assembled(form), SAME_PATTERN)
         assert A.norm() == 0.0
 
 

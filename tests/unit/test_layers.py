@@ -25,7 +25,6 @@ ORDER = (
     "structures",
     "equations",
     "analysis",
-    "refinement",
     "accuracy",
     "commands",
 )
@@ -161,7 +160,7 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
         "rotfem.scene",
         "rotfem.results",
         "rotfem.results.plots",
-        "rotfem.commands.cost.result",
+        "rotfem.accuracy.cost",
         "rotfem.commands.cli",
     ],
 )

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 import xarray
 
-from rotfem.commands.cost.result import CostResult
 from rotfem.errors import OutputError
-from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
+from rotfem.results import CampbellResult, CriticalSpeed, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import SHORT, Columns, ShortTable, described, label, numbers
-from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])
 X = np.array([0.0, 2.0, 4.0])
@@ -91,47 +89,7 @@ def campbell() -> CampbellResult:
     return CampbellResult(said, rows)
 
 
-def explained() -> ExplainResult:
-    """Return an effect and a theory; the theory fails for one output, and its truth was not computed."""
-    rows = [
-        {"kind": "effect", "name": "coriolis", "included": True, "why": "the structure spins", "verdict": "noticeable"}
-        | {"estimate": {"steady": 0.0, "modes": 0.02}, "worst": 0.02, "truth": {"steady": 0.0, "modes": 0.021}},
-        {"kind": "theory", "name": "linear", "included": False, "why": "not good enough", "verdict": "large"}
-        | {"estimate": {"steady": np.inf, "modes": 0.5}, "worst": np.inf},
-    ]
-    return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}, resolution=1e-4), rows)
-
-
-def cost() -> CostResult:
-    """Return a study of four settings: two on the front, one beaten, one failed."""
-    setting = {"theory": "reissner", "elements": [4, 2], "degree": 2, "scheme": "newmark", "tolerance": None}
-    rows = [
-        {**setting, "step": step, "status": "failed" if error is None else "done", "error": error, "reason": ""}
-        | {"total_error": error, "time": time, "cost": time, "pareto": pareto}
-        for step, time, error, pareto in (
-            (0.01, 4.0, 1e-5, True),
-            (0.02, 2.0, 1e-3, True),
-            (0.03, 3.0, 1e-2, False),
-            (0.1, 1.0, None, False),
-        )
-    ]
-    said = summary(command="cost", output="tip", accuracy=1e-4, uncertainty=1e-6, recommended=rows[0])
-    del said["theory"]  # a study is of several
-    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": []}
-    section = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
-    structure = {"type": "planar_beam", "length": 1.0, "section": section}
-    scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
-    return CostResult(said, rows, scene)
-
-
-MAKERS = {
-    "run": history,
-    "modes": modes,
-    "plate": plate_modes,
-    "campbell": campbell,
-    "explain": explained,
-    "cost": cost,
-}
+MAKERS = {"run": history, "modes": modes, "plate": plate_modes, "campbell": campbell}
 ALL = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 
 
@@ -180,14 +138,6 @@ def test_branches_over_speed() -> None:
     np.testing.assert_array_equal(result.branches()["1st axial"]["frequency"], [6.0, 16.0])
 
 
-def test_changes_of_effects_and_front_of_a_study() -> None:
-    result = explained()
-    assert result.effects["coriolis"]["worst"] == 0.02
-    assert list(result.theories) == ["linear"]
-    assert result.verdicts == {"coriolis": "noticeable", "linear": "large"}
-    assert [row["step"] for row in cost().front] == [0.02, 0.01]
-
-
 # --- columns: CSV, tables, labelled arrays ----------------------------------------------------------------------------
 
 
@@ -212,10 +162,6 @@ def test_tables_of_pandas() -> None:
     table = campbell().to_pandas()
     assert table.loc[(5.0, "1st axial"), "frequency"] == 16.0
     assert list(table["frequency"].unstack("label")["1st edgewise"]) == [3.0, 8.0, 13.0]
-    rows = explained().to_pandas()
-    assert rows.loc["coriolis", "truth_modes"] == 0.021
-    assert np.isnan(rows.loc["linear", "truth_modes"])
-    assert np.isnan(cost().to_pandas()["error"][3])
 
 
 def test_labelled_arrays(tmp_path: Path) -> None:
@@ -238,11 +184,9 @@ def test_labelled_arrays(tmp_path: Path) -> None:
     branches = campbell().to_xarray()
     assert float(branches["frequency"].sel(speed=5.0, label="1st axial")) == 16.0
     assert np.isnan(branches["frequency"].sel(speed=10.0, label="1st axial"))
-    study = cost().to_xarray()
-    assert study["time"].attrs["units"] == "s"
-    study.to_netcdf(tmp_path / "cost.nc")
-    with xarray.open_dataset(tmp_path / "cost.nc") as again:
-        np.testing.assert_array_equal(again["error"].values, study["error"].values)
+    branches.to_netcdf(tmp_path / "campbell.nc")
+    with xarray.open_dataset(tmp_path / "campbell.nc") as again:
+        np.testing.assert_array_equal(again["frequency"].values, branches["frequency"].values)
 
 
 def test_names_and_units_of_columns() -> None:
@@ -265,6 +209,7 @@ def test_a_result_is_a_line_at_a_prompt_and_tables_with_a_figure_in_a_notebook(m
     assert "mind the gap" in page
     assert page.count("<img src=") == 1
     assert page.count("<table>") == len(result.tables())
+    assert result.plot()._repr_png_().startswith(b"\x89PNG"), "a notebook shows figures without a magic word"
     paths = result.draw(tmp_path)
     assert [path.name for path in paths] == list(result.drawings()) != []
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)

@@ -43,14 +43,15 @@ def test_steps_have_legs_from_knot_to_knot_or_one_with_a_line() -> None:
     np.testing.assert_allclose([leg.end for leg in legs], [0.1, *few, 0.2, 0.3, 0.4, 0.5], rtol=1e-12)
     assert [leg.lands for leg in legs] == [False, *FEW * [True], False, True, False, False]
     assert [leg.whole for leg in legs] == [True, *FEW * [False], *4 * [True]]
-    assert [leg.line for leg in legs] == [*(FEW + 3) * [None], pytest.approx((0.3, 0.4)), None]
+    assert [leg.line for leg in legs] == [*(FEW + 3) * [None], pytest.approx((0.3, 0.4, 1)), None]
     whole = list(TimeGrid([signal], np.linspace(0.0, 0.5, 6), 0.1, lands=False))
     assert [leg.line is not None for leg in whole] == [False, True, False, True, False]
 
 
+@pytest.mark.parametrize("degree", [1, 3])
 @pytest.mark.parametrize("knots", [[0.3, 0.41, 0.7], [], [0.2, 0.2 + 1e-12, 0.9]])
-def test_a_line_has_impulse_and_first_moment_of_its_signal(knots: list[float]) -> None:
-    """∫ f and ∫ t f over the step, of parabolas that jump at knots; a straight f is its own line."""
+def test_a_fit_has_the_moments_of_its_signal(knots: list[float], degree: int) -> None:
+    """∫ tᵏ f over the step up to the degree, of parabolas that jump at knots; a polynomial is its own fit."""
 
     def f(t: float) -> float:
         piece = float(np.searchsorted(knots, t))
@@ -58,15 +59,16 @@ def test_a_line_has_impulse_and_first_moment_of_its_signal(knots: list[float]) -
 
     begin, end = 0.1, 1.0
     edges, x, w = [begin, *knots, end], *np.polynomial.legendre.leggauss(5)
-    exact, seen = np.zeros(2), np.zeros(2)
+    exact, seen = np.zeros(degree + 1), np.zeros(degree + 1)
     signal = TimeSignal("a", f, np.array(knots))
     for a, b in pairwise(edges):
-        for s, weight in zip((a + b) / 2 + (b - a) / 2 * x, (b - a) / 2 * w, strict=True):
-            exact += weight * f(s) * np.array([1.0, s])
-            seen += weight * signal.on_line(s, begin, end) * np.array([1.0, s])
+        s = (a + b) / 2 + (b - a) / 2 * x
+        powers = (b - a) / 2 * w * s ** np.arange(degree + 1)[:, None]
+        exact += powers @ np.array([f(t) for t in s])
+        seen += powers @ signal.fitted(s, begin, end, degree)[:, 0]
     np.testing.assert_allclose(seen, exact, rtol=1e-12)
-    straight = TimeSignal("b", lambda t: 2.0 - 3.0 * t, np.array(knots))
-    assert straight.on_line(0.33, begin, end) == pytest.approx(2.0 - 3.0 * 0.33, rel=1e-12)
+    own = TimeSignal("b", lambda t: 2.0 - 3.0 * t**degree, np.array(knots))
+    assert own.fitted(np.array([0.33]), begin, end, degree)[0, 0] == pytest.approx(2.0 - 3.0 * 0.33**degree, rel=1e-12)
 
 
 def beam(**tables: Any) -> Any:

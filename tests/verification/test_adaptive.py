@@ -38,7 +38,7 @@ def moved(name: str, **time: Any) -> Any:
     return run({"structure": STRUCTURE, "mesh": {"elements": 4}, "time": {"end": end, **time}} | tables)
 
 
-#: Fixed steps of Radau's method by which a motion is known to a tenth of the smallest tolerance; where axial vibrations
+#: Fixed steps by which a motion is known to a tenth of the smallest tolerance; where axial vibrations
 #: are struck its error falls with the step only.
 EXACT = {"spin-up": 2_000, "torque pulse": 8_000, "light hub": 8_000, "sudden stop": 20_000} | dict.fromkeys(
     ("tip release", "late pulse"), 40_000
@@ -47,8 +47,8 @@ EXACT = {"spin-up": 2_000, "torque pulse": 8_000, "light hub": 8_000, "sudden st
 
 @cache
 def exact(name: str, steps: int) -> Any:
-    """Return a motion in so many fixed steps of Radau's method, which is computed once."""
-    return moved(name, step=MOTIONS[name][1] / steps, scheme="radau5")
+    """Return a motion in so many fixed steps, which is computed once."""
+    return moved(name, step=MOTIONS[name][1] / steps, scheme="esdirk4")
 
 
 def error(result: Any, truth: Any) -> float:
@@ -69,12 +69,13 @@ def check(name: str, tolerance: float, scheme: str, reference: int) -> None:
 
 
 def test_the_usual_scheme() -> None:
-    """Without a scheme adaptive steps are of fourth order; a parameter of generalised-α asks for that."""
+    """Without a scheme adaptive steps are of fourth order; generalised-α has fixed ones."""
     scene = {"structure": STRUCTURE, "motion": STILL, "time": {"end": 1.0, "tolerance": 1e-2}}
     assert rotfem.Scene.from_dict(scene).time.scheme == "esdirk4"
-    alpha = rotfem.Scene.from_dict(scene).replace({"time.spectral_radius": 0.8})
-    assert alpha.time.scheme == "generalised_alpha"
-    assert alpha.replace({"time.tolerance": None, "time.step": 0.1}).time.scheme == "generalised_alpha"
+    alpha = rotfem.Scene.from_dict(scene).replace({"time.tolerance": None, "time.step": 0.1})
+    assert alpha.replace({"time.spectral_radius": 0.8}).time.scheme == "generalised_alpha"
+    with pytest.raises(rotfem.SceneError, match="does not estimate its error"):
+        rotfem.Scene.from_dict(scene | {"time": scene["time"] | {"spectral_radius": 0.8}})
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("spin-up", 1e-3), ("sudden stop", 1e-2), ("torque pulse", 1e-2)])
@@ -96,14 +97,6 @@ def test_error_and_steps_of_every_motion(name: str, tolerance: float) -> None:
     check(name, tolerance, "esdirk4", EXACT[name])
 
 
-@pytest.mark.nightly
-@pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["generalised_alpha", "radau5"])
-@pytest.mark.parametrize("name", list(MOTIONS))
-def test_errors_of_other_schemes(name: str, scheme: str) -> None:
-    assert error(moved(name, tolerance=1e-2, scheme=scheme), exact(name, EXACT[name])) < 1e-2
-
-
 def test_a_late_pulse_is_met() -> None:
     """One second of load after a minute of rest: 0.2337 m, as fixed steps of 2.5 ms find."""
     late = moved("late pulse", tolerance=3e-2).history["tip_u2"]
@@ -118,33 +111,42 @@ def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(caught.value.result.history["t"]) > 10  # type: ignore[attr-defined]
 
 
-def test_jumps_denser_than_steps_act_by_their_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A force that jumps 2000 times is its mean and a ripple at ω = 2000π/T, which moves less than its part of (ω₁/ω)².
+def rows(f: Any, end: float, number: int) -> list[list[float]]:
+    return [[float(t), float(f(t))] for t in np.linspace(0.0, end, number)]
 
-    Of 400 cells of the time grid each has five jumps, and one or two steps but for the first ones; what is left is the
-    tolerance.
-    """
-    monkeypatch.setattr("rotfem.analysis.march.CELL", 1 / 400)
-    end, found = 0.5, []
-    starts = np.arange(2000) * end / 2000
-    rows = [[t, 0.0, 10.0 * (i % 2)] for i, start in enumerate(starts) for t in (start, start + end / 2001)]
-    for force in ({"over_time": rows}, [0.0, 5.0]):
-        scene = {"structure": STRUCTURE, "motion": STILL, "mesh": {"elements": 2}, "loads": {"tip_force": force}}
-        scene["initial"] = {"state": "undeformed"}  # from the same state, whatever the load is at t = 0
-        model, time = {"theory": "consistent_linear"}, {"end": end, "tolerance": 1e-3}
-        found.append(run({**scene, "model": model, "time": time}))
-    ripple, mean = (result.history for result in found)
-    assert found[0].summary["steps"] < 1000
-    off = np.interp(ripple["t"], mean["t"], mean["tip_u2"]) - ripple["tip_u2"]
-    assert np.max(np.abs(off)) < 3e-3 * np.max(np.abs(mean["tip_u2"]))
+
+@pytest.mark.parametrize("kind", ["torque", "speed"])
+def test_a_fine_table_costs_what_its_function_does(kind: str) -> None:
+    """Rows closer than steps make no steps of their own, and the answers agree to the tolerance."""
+    end, table = 10.0, rows(lambda t: 40 * (1 - np.cos(2 * np.pi * t / 5)), 10.0, 401)
+    motions: list[Any] = [
+        {"type": "torque", "hub_inertia": 150.0, "table": table},
+        {"type": "torque", "hub_inertia": 150.0, "table": table[::4]},
+    ]
+    if kind == "speed":
+        table = rows(lambda t: 0.4 * np.sin(np.pi * t / 10) ** 2, end, 401)
+        motions = [{"type": "table", "table": table, "interpolation": how} for how in ("pchip", "cubic")]
+    time = {"end": end, "tolerance": 1e-3, "output_step": 0.1}
+    found = [run({"structure": STRUCTURE, "mesh": {"elements": 4}, "motion": m, "time": time}) for m in motions]
+    tips = [result.history["tip_u2"] for result in found]
+    assert np.max(np.abs(tips[0] - tips[1])) < 2e-3 * np.max(np.abs(tips[1]))
+    assert found[0].summary["steps"] < 250
+
+
+def test_a_burst_in_a_table_is_not_passed_over() -> None:
+    """50 N forth and back over rows of 5 ms, after rest: of a soft mode its impulse alone would be left."""
+    t = np.linspace(0.0, 1.0, 201)
+    force = np.where(np.abs(t - 0.5) < 0.05, 50.0 * (-1.0) ** np.arange(201), 0.0)
+    loads = {"tip_force": {"table": [[float(a), 0.0, float(b)] for a, b in zip(t, force, strict=True)]}}
+    scene = {"structure": STRUCTURE, "motion": STILL, "mesh": {"elements": 2}, "loads": loads}
+    fine = run({**scene, "time": {"end": 1.0, "step": 5e-4, "output_every": 10, "scheme": "esdirk4"}}).history
+    found = run({**scene, "time": {"end": 1.0, "tolerance": 1e-2, "output_step": 5e-3}}).history
+    assert np.max(np.abs(found["tip_u2"] - fine["tip_u2"])) < 1e-2 * np.max(np.abs(fine["tip_u2"]))
 
 
 def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hub held at a speed by a switch slides on its jump in ever shorter steps: said when the pace is known.
-
-    After some 200 of them the switch would be recognised.
-    """
-    monkeypatch.setattr("rotfem.analysis.march.PACE", 25)
+    """A hub held at a speed by a switch slides on its jump in ever shorter steps."""
+    monkeypatch.setattr("rotfem.analysis.march.MEAN", 25)
     monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 500)
     switch = {
         "type": "torque",
@@ -154,15 +156,12 @@ def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> 
     scene = {"structure": STRUCTURE, "motion": switch, "mesh": {"elements": 2}}
     with pytest.raises(rotfem.ComputationError, match="do not reach the end") as caught:
         run({**scene, "time": {"end": 1.0, "tolerance": 1e-3}})
-    assert "time.step" in caught.value.advice
+    assert "a hysteresis" in caught.value.advice
     assert caught.value.time is not None
 
 
-@pytest.mark.parametrize("damping", [{}, {"kelvin_voigt": 1e-3}], ids=str)
-def test_advice_where_steps_are_too_short(damping: dict[str, float]) -> None:
-    """Damping is no advice for what has it."""
-    tables = {"structure": STRUCTURE | {"damping": damping}, "motion": STILL, "initial": {"state": "undeformed"}}
+def test_advice_where_steps_are_too_short() -> None:
+    tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"state": "undeformed"}}
     time = {"end": 10.0, "tolerance": 1e-6, "min_step": 0.1}
-    with pytest.raises(rotfem.ComputationError, match="smaller time.min_step") as caught:
+    with pytest.raises(rotfem.ComputationError, match="smaller time.min_step"):
         run({**tables, "loads": {"tip_force": [0.0, 50.0]}, "time": time})
-    assert ("some damping" in str(caught.value)) == (not damping)

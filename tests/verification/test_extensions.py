@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -159,6 +160,26 @@ def test_schemes_of_second_order(extension: Callable[[str], ModuleType], kind: s
         a, b, c = values(make, scheme, column, steps)
         assert np.log2(abs((b - a) / (c - b))) == pytest.approx(2.0, abs=0.2), scheme
         assert c + (c - b) / 3 == pytest.approx(fine + (fine - coarse) / 3, rel=2e-4), scheme
+
+
+@pytest.mark.parametrize("kind", ["fixed", "free hub"])
+def test_a_scheme_of_fifth_order_with_coupled_stages(extension: Callable[[str], ModuleType], kind: str) -> None:
+    """Of a section so soft in every way that these steps resolve all motions, under a smooth speed or torque."""
+    extension("radau5")
+    soft = {"EA": 20.0, "GA": 20.0, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 0.5}
+    torque = {"type": "torque", "hub_inertia": 1.0, "table": [[0.0, 0.0], [1.0, 0.5], [2.0, -0.5]]}
+    tables: dict[str, Any] = {
+        "structure": {"type": "planar_beam", "length": 1.0, "section": soft},
+        "motion": {"type": "spin_up", "speed": 1.0, "duration": 2.0} if kind == "fixed" else torque,
+        "mesh": {"elements": 1, "degree": 2},
+        "solver": {"increment_tolerance": 1e-11},
+    }
+    last = []
+    for number in (20, 40, 80, 160):
+        time = {"end": 2.0, "step": 2.0 / number, "output_every": number // 20, "scheme": "radau5"}
+        last.append(rotfem.run({**tables, "time": time}).history["tip_u2"])
+    change = [np.max(np.abs(b - a)) for a, b in pairwise(last)]
+    assert np.log2(change[-2] / change[-1]) > 4.6
 
 
 def test_scheme_without_an_error_estimate_has_no_adaptive_steps(extension: Callable[[str], ModuleType]) -> None:

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 import rotfem
 from rotfem import Scene
 from rotfem.analysis.load_steps import recounted
+from rotfem.analysis.march import keep_rotations_small
 from rotfem.analysis.schemes import State
-from rotfem.analysis.stepper import keep_rotations_small
 from rotfem.commands.problem import Problem
 from tests.plate_mesh_files import write_msh
 

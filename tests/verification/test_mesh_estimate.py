@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import ModesResult, campbell, modes
-from rotfem.refinement.estimate import ASYMPTOTIC
+from rotfem.accuracy.errors import ASYMPTOTIC
 
 BEAM = {
     "type": "planar_beam",

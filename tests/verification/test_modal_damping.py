@@ -168,7 +168,7 @@ def test_branches_over_speed_are_damped() -> None:
 # --- histories --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("scheme", "tolerance"), [("esdirk4", 1e-5), ("radau5", 1e-6), ("generalised_alpha", 5e-3)])
+@pytest.mark.parametrize(("scheme", "tolerance"), [("esdirk4", 1e-5), ("generalised_alpha", 5e-3)])
 def test_release_decays_by_the_ratio(scheme: str, tolerance: float) -> None:
     """All modes but the first are damped by a ratio of 0.9, so after a while the tip moves as e^{−ζωt} cos(ω_d t + φ).
 
@@ -211,17 +211,17 @@ def test_spinning_beam_loses_what_damping_takes() -> None:
 
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
 def test_schemes_agree_on_a_free_hub(theory: str) -> None:
-    """Bordered equations by blocks, with complex factors: to the error of the second order."""
+    """Bordered equations by blocks: to the error of the second order."""
     scene = beam([0.05, 0.05], theory=theory, motion=HUB)
     tips = {}
-    for scheme, step in (("radau5", 0.01), ("esdirk4", 0.01), ("generalised_alpha", 0.0025)):
+    for scheme, step in (("esdirk4", 0.01), ("generalised_alpha", 0.0025)):
         time = {"time": {"end": 0.5, "step": step, "scheme": scheme, "output_step": 0.02}}
         tips[scheme] = run(scene.replace(time)).history["tip_u2"]
     undamped = run(scene.replace(time | {"structure.damping": {}})).history["tip_u2"]
-    size = np.max(np.abs(tips["radau5"]))
-    assert np.max(np.abs(undamped - tips["radau5"])) > 2e-2 * size
+    size = np.max(np.abs(tips["esdirk4"]))
+    assert np.max(np.abs(undamped - tips["esdirk4"])) > 2e-2 * size
     for name, tip in tips.items():
-        assert np.max(np.abs(tip - tips["radau5"])) < 1e-3 * size, name
+        assert np.max(np.abs(tip - tips["esdirk4"])) < 1e-3 * size, name
 
 
 # --- what it is part of, and what is refused --------------------------------------------------------------------------

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 from rotfem import ComputationError, run
 from rotfem.analysis.equilibrium import static_tip_shape
-from rotfem.analysis.schemes import Stage, State
-from rotfem.analysis.stepper import check_root
+from rotfem.analysis.march import check_root
+from rotfem.analysis.schemes import Stage
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.numerics import forms
@@ -146,24 +146,16 @@ def test_creep_of_a_beam_that_is_all_viscosity(displacement: float) -> None:
     assert path == pytest.approx(np.exp(-result.history["t"] / 10.0), abs=4e-3 if displacement < 0.1 else 8e-3)
 
 
-def test_roots_that_are_not_the_motions() -> None:
-    """A state turned inside out, and one with energy from nowhere, are refused though they may balance."""
+def test_a_root_that_is_not_the_motions() -> None:
+    """A state turned inside out is refused though it may balance."""
     system = compile_system(Problem.of(beam(1e3, 0.1)))
     system.set_time(0.0)
     zero = system.zeros()
-    rest = State(0.0, zero, zero.copy(), zero.copy())
-
-    def check(q: Any, v: Any = zero) -> None:
-        check_root(system, Stage(0.02, q, v, zero, 1.0, 1.0), rest)
-
-    check(zero)
-    x = system.V.tabulate_dof_coordinates()[:, 0]
-    inside_out, moving = zero.copy(), zero.copy()
-    inside_out[::3], moving[1::3] = -2.0 * x, x
+    check_root(system, Stage(0.02, zero, zero, zero, 1.0, 1.0))
+    inside_out = zero.copy()
+    inside_out[::3] = -2.0 * system.V.tabulate_dof_coordinates()[:, 0]
     with pytest.raises(ComputationError, match="inside out"):
-        check(inside_out)
-    with pytest.raises(ComputationError, match=r"2e\+02 J more than there were"):
-        check(zero, moving)  # ½ ∫ ρ x² dx = 200 J
+        check_root(system, Stage(0.02, inside_out, zero, zero, 1.0, 1.0))
 
 
 def test_a_beam_that_hardly_moves_is_not_inside_out() -> None:

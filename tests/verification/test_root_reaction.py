@@ -29,7 +29,7 @@ BALANCES = {
 
 
 #: Schemes, and how far what they end in is off: Newton's last increment, 1e-9 times EA; two of them times 1/h.
-DIGITS = {"generalised_alpha": 1e-10, "newmark": 1e-10, "energy_conserving": 1e-10, "esdirk4": 1e-5, "radau5": 1e-6}
+DIGITS = {"generalised_alpha": 1e-10, "newmark": 1e-10, "energy_conserving": 1e-10, "esdirk4": 1e-5}
 #: Damping that stresses carry, and that the hub takes up.
 LAST = ("generalised_alpha", "energy_conserving")
 DAMPING: dict[str, Any] = {"none": {}, "rayleigh": {"rayleigh": [0.8, 2e-3]}, "modal": {"modal": [0.02, 0.03, 0.05]}}

@@ -1,4 +1,4 @@
-"""Energy from nowhere: steps that feed it are made in parts, and what is left of it is in the estimated error."""
+"""Energy and momentum of free hubs that steps do not resolve; what comes from nowhere is in the estimated error."""
 
 from __future__ import annotations
 
@@ -20,14 +20,6 @@ def released(**time: Any) -> dict[str, Any]:
         "initial": {"tip_displacement": 2.0},
         "time": {"end": 11.0, "step": 0.02, **time},
     }
-
-
-def test_steps_that_feed_vibrations_are_made_in_parts() -> None:
-    """Without numerical damping steps of 0.02 s gain as much as is exchanged in 11 s, if all of them are whole."""
-    result = run(released(scheme="generalised_alpha", spectral_radius=1.0))
-    energy, strain = result.history["jacobi"], result.history["strain"]
-    assert np.max(energy) - energy[0] < 0.2 * np.max(strain)
-    assert any("halved" in warning for warning in result.summary["warnings"])
 
 
 #: A spatial beam on a hub of next to no inertia under a torque that jumps: its first part answers with 1e3 rad/s².
