@@ -46,6 +46,9 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     if "left_out" in s:
         lines.append(f"not computed, as nothing excites it: {', '.join(s['left_out']['unknowns'])}")
     lines += accuracy_report(s)
+    if dropped := s.get("needed", {}).get("dropped"):
+        together = percent(s["needed"]["change"])
+        lines.append(f"effects left out for the accuracy: {', '.join(dropped)}; together {together}")
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []

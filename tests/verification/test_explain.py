@@ -494,3 +494,18 @@ def test_the_model_that_a_scene_needs_gives_the_answer_of_the_whole_one() -> Non
     exact = rotfem.explain(asked.replace({"accuracy": 1e-8})).summary["needed"]
     assert exact["dropped"] == []
     assert exact["theory"] == "reissner"
+
+
+def test_an_accuracy_leaves_out_what_it_does_not_need() -> None:
+    """The answer without these effects is within the accuracy of a fine answer with all of them."""
+    asked = scene(SPIN_UP, {"time": {"end": 5.0, "output_step": 0.05}, "accuracy": 1e-2, "model.effects": "needed"})
+    fine = {"accuracy": None, "model.effects": "auto", "time.tolerance": 1e-5, "mesh.elements": 8, "mesh.degree": 4}
+    result, true = rotfem.run(asked), rotfem.run(asked.replace({**fine, "output.error": False}))
+    assert set(result.summary["effects"]) == {"centrifugal", "euler"}
+    assert set(result.summary["needed"]["dropped"]) == {"coriolis", "rotary_inertia"}
+    error = result.summary["error"]
+    assert 0.0 < error["effects"] <= 0.25e-2
+    assert distance(tip(true), tip(result)) <= error["total"] <= 1e-2
+    assert any("left out for the accuracy: " in line for line in report(result))
+    with pytest.raises(rotfem.SceneError, match="needs accuracy"):
+        rotfem.run(scene(SPIN_UP, {"model.effects": "needed"}))
