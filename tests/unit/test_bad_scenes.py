@@ -57,7 +57,7 @@ model.theory='reisner' -> did you mean "reissner"?
 model.theory='exact' -> "consistent_linear"
 model.effects=['corolis'] -> did you mean "coriolis"?
 model.effects=['euler', 'euler'] -> twice
-model.effects='all' -> "auto" or a list
+model.effects='all' -> a list of coriolis
 accuracy=0.001; output={error=false} -> @output.error cannot be combined with accuracy
 model={frame='inertial', theory='linear'} -> @model.frame reissner
 model.frame='inertial'; motion={type='torque', hub_inertia=1.0} -> @model.frame torque
