@@ -229,9 +229,9 @@ class BranchPath:
         self.points = [self.left, *self.points[1:-1], self.right]
         count = len(first.spinning.pairs.values)
         known = {None, unstable(first.spinning), unstable(last.spinning)}
-        growing = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
-        if growing:
-            self.hidden = max(growing, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
+        hidden = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
+        if hidden:
+            self.hidden = max(hidden, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
 
     def _advance(self, target: SpeedPoint) -> None:
         """Append a point of the model, and points before it as long as the step is not sure."""
