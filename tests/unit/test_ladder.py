@@ -15,8 +15,9 @@ from rotfem.accuracy.refine import Clock, OverBudget, Walk, ratio_of, reduced, w
 from rotfem.errors import ComputationError
 from rotfem.results.distance import Series
 from rotfem.scene import Scene
+from tests.beams import STRUCTURE
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+SECTION = STRUCTURE["section"]
 BEAM = {
     "structure": {"type": "planar_beam", "length": 10.0, "section": SECTION},
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},

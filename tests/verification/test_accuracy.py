@@ -10,8 +10,9 @@ import pytest
 
 import rotfem
 from rotfem.results.distance import Series
+from tests.beams import STRUCTURE
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+SECTION = STRUCTURE["section"]
 BEAM = {"type": "planar_beam", "length": 10.0, "section": SECTION}
 T = np.linspace(0.0, 3.0, 151)
 SCENES: dict[str, dict[str, Any]] = {
