@@ -229,9 +229,9 @@ class BranchPath:
         self.points = [self.left, *self.points[1:-1], self.right]
         count = len(first.spinning.pairs.values)
         known = {None, unstable(first.spinning), unstable(last.spinning)}
-        growing = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
-        if growing:
-            self.hidden = max(growing, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
+        hidden = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
+        if hidden:
+            self.hidden = max(hidden, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
 
     def _advance(self, target: SpeedPoint) -> None:
         """Append a point of the model, and points before it as long as the step is not sure."""
@@ -258,13 +258,16 @@ class BranchPath:
         assign(left, point)
         return point
 
-    def zeros(self, f: Callable[[SpeedPoint], float], off: float = ZEROS) -> Iterator[tuple[float, float]]:
+    def zeros(
+        self, f: Callable[[SpeedPoint], float], off: float = ZEROS, jumps: bool = False
+    ) -> Iterator[tuple[float, float]]:
         """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before.
 
         What it differs by between the modes solved at both ends and those of the model there, is taken off linearly.
+        Where it jumps, as from one mode to another that round-off confuses, there is no zero; all are if it `jumps`.
         """
         (a, b), known = (self.left.speed, self.right.speed), {p.speed: f(p) for p in (self.left, self.right)}
-        apart = [known[x] - f(self.at(x)) for x in (a, b)]
+        apart = [0.0 if jumps else known[x] - f(self.at(x)) for x in (a, b)]
 
         def g(x: float) -> float:
             try:
@@ -276,10 +279,10 @@ class BranchPath:
         known |= {p.speed: g(p.speed) for p in self.points[1:-1]}
         for (low, before), (high, after) in pairwise(sorted(known.items())):
             if before * after < 0.0:
-                speed = brentq(
-                    lambda x: known[x] if x in known else g(x), low, high, xtol=off * max(abs(a), abs(b)), rtol=off
-                )
-                yield float(speed), float(np.sign(before))
+                least = off * max(abs(a), abs(b))
+                speed = brentq(lambda x: known[x] if x in known else g(x), low, high, xtol=least, rtol=off)
+                if jumps or abs(g(speed)) < 1e-2 * min(abs(before), abs(after)) + 1e-6 * abs(speed):
+                    yield float(speed), float(np.sign(before))
 
 
 class Sweep:
@@ -466,7 +469,7 @@ class Sweep:
         f: Callable[[SpeedPoint], float],
         speed: float,
         sign: float,
-        met: Callable[[SpeedPoint], bool] = lambda point: False,
+        met: Callable[[SpeedPoint], bool] | None = None,
     ) -> float:
         """Return the speed on a path where a function of the modes changes its sign, to LOCATED.
 
@@ -478,7 +481,7 @@ class Sweep:
             f: point ↦ number.
             speed: where the model has the zero.
             sign: of f before it.
-            met: whether f is zero at a point but for the error bound of the modes there.
+            met: whether f is zero at a point but for the error bound of the modes there; None of an f that jumps.
         """
         if self.is_exact or self.only:
             return speed
@@ -490,8 +493,8 @@ class Sweep:
             part = self._path(path.left, point)
             if f(point) * sign > 0.0:
                 part = self._path(point, replace(path.right))
-            there = [x for x, s in part.zeros(f) if s == sign]
-            if not there or met(point):
+            there = [x for x, s in part.zeros(f, jumps=met is None) if s == sign]
+            if not there or (met is not None and met(point)):
                 return speed
             before, speed = speed, min(there, key=lambda x: abs(x - speed))
             if (speed - before) ** 2 <= LOCATED * abs(speed) * (path.right.speed - path.left.speed):
@@ -504,10 +507,7 @@ class Sweep:
         A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it. One in
         which no growth is above the error bound of its mode is none.
         """
-        sure = [point.speed for point in self.points if unstable(point.spinning) is not None]
-        if not sure:
-            return []
-        kinds = [unstable(point.spinning, bounded=False) for point in self.points]
+        kinds = [unstable(point.spinning) for point in self.points]
         out: list[dict[str, Any]] = []
         if kinds[0] is not None:
             out.append({"speed": self.points[0].speed, "kind": kinds[0], "until": None})
@@ -521,33 +521,36 @@ class Sweep:
                 out[-1]["until"] = speed
             if after is not None:
                 out.append({"speed": speed, "kind": after, "until": None})
-        ends = [np.inf if r["until"] is None else r["until"] for r in out]
-        return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
+        return out
 
     def _changes(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
-        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
+        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost.
+
+        Where growth begins or ends, round-off of a λ near zero may call it static or dynamic.
+        """
         count = len(path.left.spinning.pairs.values)  # a model has more
 
         def f(point: SpeedPoint) -> float:
-            return 1.0 if unstable(point.spinning.first(count), bounded=False) == before else -1.0
+            kind = unstable(point.spinning.first(count))
+            same = kind == before if before and after else (kind is None) == (before is None)
+            return 1.0 if same else -1.0
 
-        places = [speed for speed, sign in path.zeros(f) if sign > 0.0]
+        places = [speed for speed, sign in path.zeros(f, jumps=True) if sign > 0.0]
         if not places:
             return None
         speed = self._located(path, f, places[0], 1.0)
-        before_it = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning
-        worst = max(before_it.pairs.values, key=lambda lam: lam.real)
-        return None if after is None and worst.real > 1e-2 * abs(worst) else speed
+        last = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning.first(count)
+        grows = max((lam.real for lam, _ in growing(last)), default=0.0)
+        return None if after is None and grows > 1e-2 * np.median(np.abs(last.pairs.values)) else speed
 
 
-def unstable(spinning: Spinning, bounded: bool = True) -> str | None:
-    """Return the kind of instability of the worst mode at a speed, None if all are stable.
+def growing(spinning: Spinning) -> list[tuple[complex, str]]:
+    """Return (λ, kind of instability) of the modes that grow by more than their error bounds."""
+    pairs = zip(spinning.pairs.values.tolist(), spinning.pairs.bounds.tolist(), strict=True)
+    kinds = [(lam, stability(lam, bound)) for lam, bound in pairs]
+    return [(lam, kind) for lam, kind in kinds if kind.endswith("instability")]
 
-    Args:
-        spinning: modes at one speed.
-        bounded: whether growth within the error bound of its mode is none; a search for a speed takes it as it is.
-    """
-    values, bounds = spinning.pairs.values, spinning.pairs.bounds if bounded else np.zeros(len(spinning.pairs.values))
-    kinds = [stability(complex(lam), float(bound)) for lam, bound in zip(values, bounds, strict=True)]
-    growing = [j for j, kind in enumerate(kinds) if kind.endswith("instability")]
-    return kinds[max(growing, key=lambda j: values[j].real)] if growing else None
+
+def unstable(spinning: Spinning) -> str | None:
+    """Return the kind of instability of the mode that grows fastest at a speed, None if none grows."""
+    return max(growing(spinning), key=lambda found: found[0].real, default=(0.0, None))[1]

@@ -239,9 +239,7 @@ class ModalAnalysis:
             why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
             raise InputError(key, count, why)
 
-    def at(
-        self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
-    ) -> Spinning:
+    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s).
 
         Args:
@@ -249,7 +247,6 @@ class ModalAnalysis:
             count: number of pairs, at least.
             start: the structure at a speed nearby, whose equilibrium to continue from.
             keep: whether the pencil must outlast another call; large systems save memory, and keep a factor, without.
-            near: complex columns of owned unknowns near the eigenvectors, which a large system begins with.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
@@ -261,7 +258,7 @@ class ModalAnalysis:
         t2 = perf_counter()
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
-            pencil.near, pencil.factor = near, self.system.analysed
+            pencil.factor = self.system.analysed
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         if not self.free:

@@ -189,7 +189,10 @@ def explain(
         Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the scene with what it needs")
     ] = None,
 ) -> None:
-    """Show how much each effect and each theory changes in SCENE, and which it calls for."""
+    """Show how much each effect and each theory changes in SCENE.
+
+    Its last line names those that the scene calls for.
+    """
     from rotfem.accuracy.tuned import write_variant
     from rotfem.commands.explain import explain as estimate
 

@@ -240,11 +240,9 @@ class Pencil(Sendable):
 
     Attributes:
         owner: kept alive with the matrices.
-        near: complex columns (owned rows) near the vectors of a large conservative pencil; None where none are known.
         factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
     """
 
-    near: Array | None = None
     factor: DirectSolver | None = None
 
     def __init__(self, M: Any, C: Any, K: Any):
@@ -416,7 +414,7 @@ class Pencil(Sendable):
         solver.factorise()
         self.factored += perf_counter() - started
         scale = unknown_scale(self.M, self.K, 1.0).array
-        out = gyroscopic_pairs((self.M, self.C, self.K), scale, solver, count, self.near)
+        out = gyroscopic_pairs((self.M, self.C, self.K), scale, solver, count)
         self.factor = solver
         return out
 

@@ -171,6 +171,14 @@ def test_nothing_of_fenicsx_is_loaded(module: str) -> None:
     assert done.stdout.split() == []
 
 
+def test_a_plain_run_loads_what_it_uses() -> None:
+    """Tables of pandas, splines and figures take as long to load as FEniCSx does."""
+    heavy = {"bokeh", "matplotlib", "pandas", "pint", "pyvista", "scipy", "xarray"}
+    code = f"import sys, rotfem; rotfem.run; print(*sorted({heavy!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE.parent, check=True)
+    assert done.stdout.split() == []
+
+
 def test_an_import_from_above_is_seen() -> None:
     """The test can fail: what the command line imports is not allowed for the ground."""
     assert any(package(name) == "commands" for name in own("commands.cli"))

@@ -27,8 +27,9 @@ from rotfem.scene import (
     load_scene,
 )
 from rotfem.scene.motion import TableMotion
+from tests.beams import STRUCTURE
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+SECTION = STRUCTURE["section"]
 PLANAR = {"type": "planar_beam", "length": 10.0, "section": SECTION}
 SPATIAL_SECTION = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
 SPATIAL = {"type": "spatial_beam", "length": 2.0, "section": SPATIAL_SECTION}
