@@ -23,7 +23,7 @@ PACKAGE = ROOT / "rotfem"
 #: Capability ↦ what its modules begin with, dots for slashes; a module counts for the first that fits.
 CAPABILITIES = {
     "error, accuracy, explain, cost": """
-        accuracy refinement commands.accuracy commands.answers commands.cost commands.explain results.distance
+        accuracy commands.answers commands.cost commands.explain results.distance
     """,
     "time integration": """
         analysis.dense_output analysis.first_motion analysis.march analysis.runge_kutta analysis.schemes

@@ -7,7 +7,8 @@ MOST CPU seconds. All marches of a scene are on one compiled system, and schemes
 machine does hits all of them. CPU time is that of the march alone. The error is the largest distance of the tip's
 displacement, as a vector, over 20 instants, relative to its largest; the reference is the finest march of `esdirk4`,
 whose steps are halved on until it is known to 1e-6 or a march takes more than SECONDS: after kinks and blows it has to
-resolve the vibrations along the axis that they excite. What is below its own error, by the march before, is left out. CPU times at an error are interpolated between marches; "–" was not reached.
+resolve the vibrations along the axis that they excite. What is below its own error, by the march before, is left out.
+CPU times at an error are interpolated between marches; "–" was not reached.
 """
 
 from __future__ import annotations

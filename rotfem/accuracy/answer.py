@@ -172,9 +172,11 @@ class Answers:
 
     Attributes:
         times: rows (s) of all histories; None before the first, and of what has none.
+        neglected: contribution ↦ error that all answers have beside those of their settings.
     """
 
     def __init__(self, scene: Scene, compute: Compute, moving: bool = True):
+        self.neglected: dict[str, float] = {}
         self.scene, self._compute, self.moving = scene, compute, moving and scene.time is not None
         self.times: Array | None = None
         self._found: dict[Setting, Answer | ComputationError | InputError] = {}

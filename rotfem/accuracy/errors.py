@@ -10,7 +10,7 @@ Wanner 1996, section IV.15); of elements of degree k it is max(2, k), as strains
 smooth. The error is the whole distance where that range is not shown:
 
 - the distance is above `ASYMPTOTIC`;
-- a vibration as quick as the difference d is out of phase by more than π/3, ω (ωh)² T/12 in steps h of second order
+- a vibration as quick as the difference d is out of phase by more than π/6, ω (ωh)² T/12 in steps h of second order
   (Hughes 1987, chapter 9), with ω² = ∫|ḋ|² dt / ∫|d|² dt; or the rows do not resolve it;
 - cells cannot be halved. Then the other answer has elements of one degree less, or of one more where those lock.
 
@@ -33,7 +33,7 @@ from rotfem.results.distance import Series, Spectrum
 from rotfem.scene import Scene
 
 #: Relative distance of two answers up to which their order is taken to hold; phase error (rad) likewise.
-ASYMPTOTIC, IN_PHASE = 0.05, math.pi / 3
+ASYMPTOTIC, IN_PHASE = 0.1, math.pi / 6
 
 #: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
 BEYOND = 0.75

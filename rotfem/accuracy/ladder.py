@@ -75,5 +75,5 @@ def mesh_of(scene: Scene, rung: int) -> tuple[Elements, int] | None:
 
 def cells_of(aspect: float, across: int) -> tuple[int, int]:
     """Return (nx, ny) of a rectangle of an aspect ratio with so many cells across its shorter edge."""
-    along = round(across * min(max(aspect, 1 / aspect), LONG))
+    along = across * min(round(max(aspect, 1 / aspect)), LONG)  # so that both are cut in one ratio
     return (along, across) if aspect >= 1.0 else (across, along)

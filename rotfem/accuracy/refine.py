@@ -1,8 +1,9 @@
 """Down the ladder to an accuracy: one rung at a time, until an answer is near enough to the one above it.
 
 With q the ratio of the errors of two rungs and d the distance of their answers, the error of the finer one is
-d/(q − 1). It is taken as SAFETY d/(q − 1) while d is in the asymptotic range, with the observed ratio d'/d of the rungs
-above where that is smaller than q, and as d where it is not, or where the distance does not fall by half.
+d/(q − 1), and is taken as SAFETY times that. q is the ratio of the tolerances or that of the meshes by their order,
+whichever is smaller, and the observed ratio d'/d of the rungs above if that is smaller still. Above the asymptotic
+range it is SAFETY d.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
 from rotfem.results.distance import Spectrum
 
-#: Factor of an extrapolated error.
-SAFETY = 1.5
+#: Factor of an extrapolated error; smallest ratio of the errors of two rungs that is reckoned with.
+SAFETY, SLOW = 1.5, 1.2
 
 #: Error of a rung of smooth motions as a part of its tolerance, by which the first rung is chosen; it decides nothing
 #: but where the walk begins.
@@ -45,10 +46,17 @@ class Clock:
         budget: of all answers together, s; None without a limit.
         agree: value ↦ that of the first of several processes, which decides for all.
         announce: called with a line before every long answer; None for none.
+        key: what the budget is called.
     """
 
-    def __init__(self, budget: float | None, agree: Callable[[float], float] = float, announce: Hint | None = None):
-        self.budget, self._agree, self._announce = budget, agree, announce or (lambda line: None)
+    def __init__(
+        self,
+        budget: float | None,
+        agree: Callable[[float], float] = float,
+        announce: Hint | None = None,
+        key: str = "accuracy_budget",
+    ):
+        self.budget, self._agree, self._announce, self.key = budget, agree, announce or (lambda line: None), key
         self.wanted: float | None = None
         self._started, self._began, self._compiling, self._next = cpu_time(), 0.0, Compiling.seconds, 1
 
@@ -69,6 +77,7 @@ class Clock:
         self._began, self._compiling, self._next = self.used(), Compiling.seconds, 1
         if predicted is None:
             return
+        predicted = self._agree(predicted)
         if self.budget is not None and predicted > self.budget - self._began:
             raise self._over(predicted)
         if predicted > LONG:
@@ -94,7 +103,7 @@ class Clock:
         would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
         left = max(0.0, (self.budget or 0.0) - self._began)
         return OverBudget(
-            f"{would}{left:.2g} s of accuracy_budget are left", advice="a looser accuracy, or a larger accuracy_budget"
+            f"{would}{left:.2g} s of {self.key} are left", advice=f"a looser accuracy, or a larger {self.key}"
         )
 
     def summary(self) -> dict[str, float | None]:
@@ -182,13 +191,14 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
         errors = Errors({name: None}, list(model.unknown), answer.output.scale)
         if before is not None:
             there, q = distance(answer, before[1]), TOLERANCES[before[0]] / TOLERANCES[rung]
+            q = min(q, ratio_of(before[1].setting, setting, answers.scene.structure.type == "plate"))
             errors.parts[name] = reduced(there.size, apart, q)
             errors.at, apart = there.at, there.size
             if isinstance(answer.output, Spectrum) and apart > 0.0:
                 errors.each = [float(e * (errors.parts[name] or 0.0) / apart) for e in there.each]
             if len(found.rows) == 1 and math.isfinite(apart):
                 found.rows[0]["error"] = apart  # that of the first, but for the error of this one
-        errors.parts |= model.parts
+        errors.parts |= {**model.parts, **answers.neglected}
         if (lost := answer.outcome.round_off) is not None:
             errors.parts["round_off"] = lost
         found.rows.append(row(answer.setting, errors.total, answer.seconds))
@@ -218,10 +228,22 @@ def reduced(apart: float, before: float, q: float) -> float | None:
         before: distance of the two rungs above; infinite without them.
         q: ratio of their errors.
     """
-    observed = min(q, before / apart) if apart > 0.0 else q
     if not math.isfinite(apart):
         return None
-    return SAFETY * apart / (observed - 1.0) if apart <= ASYMPTOTIC and observed >= 1.0 + SAFETY else apart
+    observed = min(q, before / apart) if apart > 0.0 else q
+    return SAFETY * apart / (max(observed, SLOW) - 1.0 if apart <= ASYMPTOTIC else 1.0)
+
+
+def ratio_of(coarse: Setting, fine: Setting, plate: bool) -> float:
+    """Return the ratio of the errors by the meshes of two rungs, by the order of displacements.
+
+    That of degrees is (k'/k)² on plates, whose solutions are not smooth (the p-version converges twice as fast as the
+    h-version: Babuška & Suri, SIAM Review 36 (1994) 578), and infinite on beams.
+    """
+    if coarse.degree != fine.degree:
+        return (fine.degree / coarse.degree) ** 2 if plate else math.inf
+    here, there = (n if isinstance(n, tuple) else (n or 1,) for n in (coarse.elements, fine.elements))
+    return float(min(b / a for a, b in zip(here, there, strict=True)) ** (fine.degree + 1))
 
 
 @dataclass(frozen=True)

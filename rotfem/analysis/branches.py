@@ -23,7 +23,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.analysis.reduced_basis import Between
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
-from rotfem.numerics.eigenproblem import SAME
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES
 from rotfem.structures.mode_names import Wave
 
 Array = npt.NDArray[Any]
@@ -33,7 +33,7 @@ SURE, AMBIGUOUS = 0.9, 0.5
 
 #: Least step of the model between two speeds, in parts of their distance (a narrower veering passes as a crossing), and
 #: most of its steps: a veering takes 34.
-FINEST, STEPS = 1e-5, 200
+FINEST, MOST_STEPS = 1e-5, 200
 
 #: Relative error of zeros of a model, and of those that only say where to solve first; the same of critical speeds and
 #: onsets, by an estimate that is 150 times too small near a veering; iterations for that, usually two.
@@ -111,11 +111,11 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
 
     Args:
         values: the eigenvalues, 1/s.
-        bounds: their relative error bounds; what is no farther apart than these, or SAME, is one.
+        bounds: their relative error bounds; what is no farther apart than these, or EQUAL_EIGENVALUES, is one.
     """
     sizes = np.abs(values)
     off = bounds * sizes
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(SAME * sizes[1:], off[1:] + off[:-1])
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(EQUAL_EIGENVALUES * sizes[1:], off[1:] + off[:-1])
     out = [[0]] if len(values) else []
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])
@@ -160,12 +160,12 @@ def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
     both = np.flatnonzero((a.order >= 0) & (b.order >= 0))
     wa, wb = (n.spinning.pairs.values[n.order[both]].imag for n in (a, b))
     da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
-    level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
+    level = EQUAL_EIGENVALUES * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
     asked = both < count
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
-class Model(Protocol):
+class ModesBetween(Protocol):
     """Modes between two speeds without a solution of the whole system."""
 
     def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
@@ -192,7 +192,7 @@ class BranchPath:
         hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
     """
 
-    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], Model], count: int):
+    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], ModesBetween], count: int):
         self.left, self.right, self.count, self._make = left, right, count, model
         self.weak: dict[int, float] = {}
         self.hidden: float | None = None
@@ -202,7 +202,7 @@ class BranchPath:
             self._follow()
 
     @cached_property
-    def model(self) -> Model:
+    def model(self) -> ModesBetween:
         """Model of the modes between the two speeds."""
         return self._make()
 
@@ -229,16 +229,19 @@ class BranchPath:
         self.points = [self.left, *self.points[1:-1], self.right]
         count = len(first.spinning.pairs.values)
         known = {None, unstable(first.spinning), unstable(last.spinning)}
-        growing = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
-        if growing:
-            self.hidden = max(growing, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
+        hidden = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
+        if hidden:
+            self.hidden = max(hidden, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
 
     def _advance(self, target: SpeedPoint) -> None:
         """Append a point of the model, and points before it as long as the step is not sure."""
         last = self.points[-1]
         assign(last, target)
         if self._unsure(last, target):
-            if target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed) and self._steps < STEPS:
+            if (
+                target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed)
+                and self._steps < MOST_STEPS
+            ):
                 self._steps += 1
                 self._advance(SpeedPoint(self.model.between(0.5 * (last.speed + target.speed)), False))
                 self._advance(target)
@@ -255,13 +258,16 @@ class BranchPath:
         assign(left, point)
         return point
 
-    def zeros(self, f: Callable[[SpeedPoint], float], off: float = ZEROS) -> Iterator[tuple[float, float]]:
+    def zeros(
+        self, f: Callable[[SpeedPoint], float], off: float = ZEROS, jumps: bool = False
+    ) -> Iterator[tuple[float, float]]:
         """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before.
 
         What it differs by between the modes solved at both ends and those of the model there, is taken off linearly.
+        Where it jumps, as from one mode to another that round-off confuses, there is no zero; all are if it `jumps`.
         """
         (a, b), known = (self.left.speed, self.right.speed), {p.speed: f(p) for p in (self.left, self.right)}
-        apart = [known[x] - f(self.at(x)) for x in (a, b)]
+        apart = [0.0 if jumps else known[x] - f(self.at(x)) for x in (a, b)]
 
         def g(x: float) -> float:
             try:
@@ -273,10 +279,10 @@ class BranchPath:
         known |= {p.speed: g(p.speed) for p in self.points[1:-1]}
         for (low, before), (high, after) in pairwise(sorted(known.items())):
             if before * after < 0.0:
-                speed = brentq(
-                    lambda x: known[x] if x in known else g(x), low, high, xtol=off * max(abs(a), abs(b)), rtol=off
-                )
-                yield float(speed), float(np.sign(before))
+                least = off * max(abs(a), abs(b))
+                speed = brentq(lambda x: known[x] if x in known else g(x), low, high, xtol=least, rtol=off)
+                if jumps or abs(g(speed)) < 1e-2 * min(abs(before), abs(after)) + 1e-6 * abs(speed):
+                    yield float(speed), float(np.sign(before))
 
 
 class Sweep:
@@ -350,9 +356,9 @@ class Sweep:
     def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> BranchPath:
         """Return the way from one point to another; if `square` its model knows the points beside them, too."""
 
-        def model() -> Model:
+        def model() -> ModesBetween:
             if self.is_exact:
-                return cast(Model, self.analysis)
+                return cast(ModesBetween, self.analysis)
             points = self.points if square else []
             beside = [p for p in points if p.speed < left.speed][-1:] + [p for p in points if p.speed > right.speed][:1]
             known = {p.speed: p.spinning for p in (left, right, *beside) if p.speed * (left.speed + right.speed) >= 0.0}
@@ -463,7 +469,7 @@ class Sweep:
         f: Callable[[SpeedPoint], float],
         speed: float,
         sign: float,
-        met: Callable[[SpeedPoint], bool] = lambda point: False,
+        met: Callable[[SpeedPoint], bool] | None = None,
     ) -> float:
         """Return the speed on a path where a function of the modes changes its sign, to LOCATED.
 
@@ -475,7 +481,7 @@ class Sweep:
             f: point ↦ number.
             speed: where the model has the zero.
             sign: of f before it.
-            met: whether f is zero at a point but for the error bound of the modes there.
+            met: whether f is zero at a point but for the error bound of the modes there; None of an f that jumps.
         """
         if self.is_exact or self.only:
             return speed
@@ -487,8 +493,8 @@ class Sweep:
             part = self._path(path.left, point)
             if f(point) * sign > 0.0:
                 part = self._path(point, replace(path.right))
-            there = [x for x, s in part.zeros(f) if s == sign]
-            if not there or met(point):
+            there = [x for x, s in part.zeros(f, jumps=met is None) if s == sign]
+            if not there or (met is not None and met(point)):
                 return speed
             before, speed = speed, min(there, key=lambda x: abs(x - speed))
             if (speed - before) ** 2 <= LOCATED * abs(speed) * (path.right.speed - path.left.speed):
@@ -501,10 +507,7 @@ class Sweep:
         A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it. One in
         which no growth is above the error bound of its mode is none.
         """
-        sure = [point.speed for point in self.points if unstable(point.spinning) is not None]
-        if not sure:
-            return []
-        kinds = [unstable(point.spinning, bounded=False) for point in self.points]
+        kinds = [unstable(point.spinning) for point in self.points]
         out: list[dict[str, Any]] = []
         if kinds[0] is not None:
             out.append({"speed": self.points[0].speed, "kind": kinds[0], "until": None})
@@ -518,33 +521,36 @@ class Sweep:
                 out[-1]["until"] = speed
             if after is not None:
                 out.append({"speed": speed, "kind": after, "until": None})
-        ends = [np.inf if r["until"] is None else r["until"] for r in out]
-        return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
+        return out
 
     def _changes(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
-        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
+        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost.
+
+        Where growth begins or ends, round-off of a λ near zero may call it static or dynamic.
+        """
         count = len(path.left.spinning.pairs.values)  # a model has more
 
         def f(point: SpeedPoint) -> float:
-            return 1.0 if unstable(point.spinning.first(count), bounded=False) == before else -1.0
+            kind = unstable(point.spinning.first(count))
+            same = kind == before if before and after else (kind is None) == (before is None)
+            return 1.0 if same else -1.0
 
-        places = [speed for speed, sign in path.zeros(f) if sign > 0.0]
+        places = [speed for speed, sign in path.zeros(f, jumps=True) if sign > 0.0]
         if not places:
             return None
         speed = self._located(path, f, places[0], 1.0)
-        before_it = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning
-        worst = max(before_it.pairs.values, key=lambda lam: lam.real)
-        return None if after is None and worst.real > 1e-2 * abs(worst) else speed
+        last = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning.first(count)
+        grows = max((lam.real for lam, _ in growing(last)), default=0.0)
+        return None if after is None and grows > 1e-2 * np.median(np.abs(last.pairs.values)) else speed
 
 
-def unstable(spinning: Spinning, bounded: bool = True) -> str | None:
-    """Return the kind of instability of the worst mode at a speed, None if all are stable.
+def growing(spinning: Spinning) -> list[tuple[complex, str]]:
+    """Return (λ, kind of instability) of the modes that grow by more than their error bounds."""
+    pairs = zip(spinning.pairs.values.tolist(), spinning.pairs.bounds.tolist(), strict=True)
+    kinds = [(lam, stability(lam, bound)) for lam, bound in pairs]
+    return [(lam, kind) for lam, kind in kinds if kind.endswith("instability")]
 
-    Args:
-        spinning: modes at one speed.
-        bounded: whether growth within the error bound of its mode is none; a search for a speed takes it as it is.
-    """
-    values, bounds = spinning.pairs.values, spinning.pairs.bounds if bounded else np.zeros(len(spinning.pairs.values))
-    kinds = [stability(complex(lam), float(bound)) for lam, bound in zip(values, bounds, strict=True)]
-    growing = [j for j, kind in enumerate(kinds) if kind.endswith("instability")]
-    return kinds[max(growing, key=lambda j: values[j].real)] if growing else None
+
+def unstable(spinning: Spinning) -> str | None:
+    """Return the kind of instability of the mode that grows fastest at a speed, None if none grows."""
+    return max(growing(spinning), key=lambda found: found[0].real, default=(0.0, None))[1]

@@ -22,7 +22,7 @@ from rotfem.numerics.projection import sparse_part
 
 Array = npt.NDArray[np.float64]
 
-KEY = "structure.supports"
+SUPPORTS_KEY = "structure.supports"
 
 #: Part of a matrix by which it may fail to commute with J: round-off of its assembly.
 ROUND_OFF = 1e-9
@@ -44,7 +44,7 @@ def check_rotating(problem: Any, what: str) -> None:
             "differ by direction, so that coefficients change with time in the rotating frame, in which "
             f"{what} is computed; modes and campbell take them"
         )
-        raise InputError(KEY, None, why)
+        raise InputError(SUPPORTS_KEY, None, why)
 
 
 class FixedFrame:
@@ -58,7 +58,7 @@ class FixedFrame:
         self.V, self.supports = system.V, system.model.problem.structure.supports
         names, axis = list(system.structure.unknowns), np.asarray(system.motion.axis, dtype=float)
         if system.hub is not None:
-            raise InputError(KEY, None, "that differ by direction need a shaft whose speed is given")
+            raise InputError(SUPPORTS_KEY, None, "that differ by direction need a shaft whose speed is given")
         turn = np.zeros((len(names), len(names)))
         for kind in ("u", "theta"):
             i, j = (names.index(f"{kind}{k}") for k in (2, 3))
@@ -88,14 +88,16 @@ class FixedFrame:
         """
         M, C, K = matrices
         if sparse_part(C) is not C:
-            raise InputError("structure.damping.modal", None, f"is not taken with {KEY} that differ by direction")
+            raise InputError(
+                "structure.damping.modal", None, f"is not taken with {SUPPORTS_KEY} that differ by direction"
+            )
         MJ, CJ = M.matMult(self._J), C.matMult(self._J)
         for A, AJ in ((M, MJ), (C, CJ), (K, K.matMult(self._J))):
             difference = self._J.matMult(A)
             difference.axpy(-1.0, AJ)
             if difference.norm() > ROUND_OFF * max(AJ.norm(), np.finfo(float).tiny):
                 why = "that differ by direction need a shaft that does not: with its masses, root and loads"
-                raise InputError(KEY, None, why)
+                raise InputError(SUPPORTS_KEY, None, why)
         C_fixed, K_fixed = C.copy(), K.copy()
         for A, factor, B in (
             (C_fixed, -2.0 * speed, MJ),

@@ -31,7 +31,7 @@ Array = npt.NDArray[Any]
 ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 
 
-class Output(NamedTuple):
+class HarmonicOutput(NamedTuple):
     """What is read of a motion x e^{st}.
 
     Attributes:
@@ -59,7 +59,7 @@ class FrequencyResponse:
         loose: whether a motion has no stiffness: the turn of a free hub, or of a hinge that nothing holds.
     """
 
-    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Output]):
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[HarmonicOutput]):
         self.analysis, self.spinning, self._outputs = analysis, spinning, outputs
         self.names = [name for output in outputs for name in output.names]
         self._given = np.concatenate([output.given + np.zeros(len(output.names)) for output in outputs])
@@ -97,17 +97,17 @@ class FrequencyResponse:
         return points[(points >= low) & (points <= high)], undamped
 
 
-def tip_output(system: Any) -> Output:
+def tip_output(system: Any) -> HarmonicOutput:
     """Return the unknowns at the tip.
 
     Args:
         system: equations of motion of the structure, the hub held.
     """
     values = system.structure.tip_values
-    return Output(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
+    return HarmonicOutput(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
 
 
-def root_output(system: Any, push: Array) -> Output:
+def root_output(system: Any, push: Array) -> HarmonicOutput:
     """Return force and moment of the hub on the structure; what is at the state in the system is the equilibrium.
 
     Args:
@@ -120,10 +120,12 @@ def root_output(system: Any, push: Array) -> Output:
         x = x[: len(K)]
         return np.asarray(summed(system.comm, x @ K + s * (x @ C) + s**2 * (x @ M)))
 
-    return Output(tuple(f"root_{name}" for name in system.root.names), read, np.asarray(summed(system.comm, push)))
+    return HarmonicOutput(
+        tuple(f"root_{name}" for name in system.root.names), read, np.asarray(summed(system.comm, push))
+    )
 
 
-def hub_output(system: Any) -> Output:
+def hub_output(system: Any) -> HarmonicOutput:
     """Return the angle (rad) of a free hub, the last unknown on the last process.
 
     Args:
@@ -135,10 +137,10 @@ def hub_output(system: Any) -> Output:
         psi = x[-1] if system.comm.rank == last else 0.0
         return np.array([psi if last == 0 else system.comm.bcast(psi, last)])
 
-    return Output(("psi",), read)
+    return HarmonicOutput(("psi",), read)
 
 
-def root_of_free_hub(system: Any, push: Array, speed: float) -> Output:
+def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
     """Return the same as `root_output` where the hub is free, in balance with its equation.
 
     Args:
@@ -169,10 +171,10 @@ def root_of_free_hub(system: Any, push: Array, speed: float) -> Output:
         about_axis = -(s**2 * hub.inertia + s * hub.damping) * psi
         return in_balance(plain.read(x, s) + psi * (s * by_speed + s**2 * by_rate), about_axis)
 
-    return Output(plain.names, read, in_balance(plain.given, 0.0))
+    return HarmonicOutput(plain.names, read, in_balance(plain.given, 0.0))
 
 
-def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, ...]) -> Output:
+def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, ...]) -> HarmonicOutput:
     """Return section forces, strains and unknowns at stations of a beam; the equilibrium is written into the system.
 
     Args:
@@ -187,4 +189,4 @@ def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, 
         x, v = x[:owned], s * x[:owned]
         return np.asarray(changes.of(x.real, v.real) + 1j * changes.of(x.imag, v.imag))[:, columns].ravel()
 
-    return Output(tuple(f"{name}@{x:g}" for x in positions for name in names), read)
+    return HarmonicOutput(tuple(f"{name}@{x:g}" for x in positions for name in names), read)

@@ -33,7 +33,7 @@ from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
@@ -239,9 +239,7 @@ class ModalAnalysis:
             why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
             raise InputError(key, count, why)
 
-    def at(
-        self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
-    ) -> Spinning:
+    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s).
 
         Args:
@@ -249,7 +247,6 @@ class ModalAnalysis:
             count: number of pairs, at least.
             start: the structure at a speed nearby, whose equilibrium to continue from.
             keep: whether the pencil must outlast another call; large systems save memory, and keep a factor, without.
-            near: complex columns of owned unknowns near the eigenvectors, which a large system begins with.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
@@ -261,7 +258,7 @@ class ModalAnalysis:
         t2 = perf_counter()
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
-            pencil.near, pencil.factor = near, self.system.analysed
+            pencil.factor = self.system.analysed
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         if not self.free:
@@ -441,4 +438,4 @@ def stability(lam: complex, bound: float = 0.0) -> str:
         return "unresolved"
     if lam.real <= max(GROWTH, bound) * abs(lam):
         return "stable"
-    return "static instability" if lam.imag <= SAME * abs(lam) else "dynamic instability"
+    return "static instability" if lam.imag <= EQUAL_EIGENVALUES * abs(lam) else "dynamic instability"

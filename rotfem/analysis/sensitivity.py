@@ -18,7 +18,7 @@ from dolfinx import fem
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.affine import AffineSystem
-from rotfem.equations.modal_damping import KEY
+from rotfem.equations.modal_damping import DAMPING_KEY
 from rotfem.errors import InputError
 from rotfem.numerics.projection import summed
 
@@ -26,7 +26,7 @@ Array = npt.NDArray[Any]
 
 #: Steps relative to the parameter, and the weights of the central difference of fourth order (Abramowitz & Stegun
 #: 1964, table 25.2), which leaves some 1e-8 of the derivative as round-off does.
-STEPS = 1e-2 * np.array([-2.0, -1.0, 1.0, 2.0])
+DIFFERENCE_STEPS = 1e-2 * np.array([-2.0, -1.0, 1.0, 2.0])
 WEIGHTS = np.array([1.0, -8.0, 8.0, -1.0]) / 12e-2
 
 
@@ -72,7 +72,7 @@ def derivatives(analysis: ModalAnalysis, spinning: Spinning, p: Parameter) -> Ar
     """Return dλ/dp of every pair, per unit of p."""
     unit, own, n = p.value or 1.0, np.array(p.numbers), np.diag(spinning.own)
     total: Any = 0.0
-    for step, weight in zip(STEPS, WEIGHTS, strict=True):
+    for step, weight in zip(DIFFERENCE_STEPS, WEIGHTS, strict=True):
         if p.numbers is None:
             total = total + weight * products(analysis, spinning, spinning.speed + step * unit)
             continue
@@ -97,7 +97,9 @@ def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str,
     analysis.needs_fixed_hub("sensitivities")
     if analysis.system.by_mode is not None:
         damping = analysis.problem.structure.damping.modal
-        raise InputError(KEY, damping, "sensitivities need damping whose derivatives are known; leave it out for them")
+        raise InputError(
+            DAMPING_KEY, damping, "sensitivities need damping whose derivatives are known; leave it out for them"
+        )
     known = [(p, derivatives(analysis, spinning, p)) for p in parameters(analysis, spinning.speed)]
     analysis.equilibrium(spinning.speed, spinning)
     rows = []

@@ -29,7 +29,7 @@ from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.balance import unknown_scale
-from rotfem.numerics.eigenproblem import SAME, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
 from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
@@ -158,7 +158,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
         if len(grows):
             fastest = grows[np.argmax(grows.real)]
             growth = float(fastest.real)
-            frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
+            frequency = float(fastest.imag) if fastest.imag > EQUAL_EIGENVALUES * abs(fastest) else 0.0
         if negative is None:
             return Stability(None, growth, frequency, lost=lost)
         growing, swinging = _counted(pencil, pairs, gyroscopic)
@@ -181,7 +181,7 @@ def _counted(pencil: Pencil, pairs: Eigenpairs, gyroscopic: bool) -> tuple[int, 
         gyroscopic: whether there are gyroscopic forces, which may stabilise it.
     """
     values = pairs.values
-    real = values.imag <= SAME * np.abs(values)
+    real = values.imag <= EQUAL_EIGENVALUES * np.abs(values)
     grows = values.real > GROWTH * np.abs(values)
     growing = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
     if not (gyroscopic and pencil.conservative):

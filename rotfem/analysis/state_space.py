@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, save_npz
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.equations.modal_damping import KEY
+from rotfem.equations.modal_damping import DAMPING_KEY
 from rotfem.errors import ComputationError, InputError, SceneError
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import PlusLowRank, sparse_part
@@ -26,7 +26,7 @@ from rotfem.results.files import writing
 Array = npt.NDArray[Any]
 
 #: Unknowns up to which a C without zeros is written, 100 MB of text.
-FULL = 2000
+LARGEST_FULL = 2000
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,9 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
     structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
     paths = [folder / f"{name}.{kind}" for name in "MCK" for kind in ("mtx", "npz")]
-    if sparse_part(spinning.pencil.C) is not spinning.pencil.C and len(free) > FULL:
-        why = f"C is full with damping by mode; it is written for up to {FULL} free unknowns, and here are {len(free)}"
-        raise InputError(KEY, analysis.problem.structure.damping.modal, why)
+    if sparse_part(spinning.pencil.C) is not spinning.pencil.C and len(free) > LARGEST_FULL:
+        why = f"C is full with damping by mode; written for up to {LARGEST_FULL} free unknowns, here are {len(free)}"
+        raise InputError(DAMPING_KEY, analysis.problem.structure.damping.modal, why)
     with writing(folder):
         for name in "MCK":
             A = getattr(spinning.pencil, name)

@@ -182,11 +182,30 @@ def explain(
     check: Annotated[
         bool, typer.Option("--check", help="run the full models too: true changes next to the estimates")
     ] = False,
+    accuracy: Annotated[
+        float | None, typer.Option("--accuracy", help="that the model of --write is for, 1e-2 by default")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the scene with what it needs")
+    ] = None,
 ) -> None:
-    """Show how much each effect and each theory changes in SCENE."""
+    """Show how much each effect and each theory changes in SCENE.
+
+    Its last line names those that the scene calls for.
+    """
+    from rotfem.accuracy.tuned import write_variant
     from rotfem.commands.explain import explain as estimate
 
-    todo.finish(estimate(todo.scene, check=check, progress=todo.progress))
+    if write is not None:
+        todo.session.check_writable("--write", write, todo.scene.inputs)
+    scene = todo.scene if accuracy is None else todo.scene.replace({"accuracy": accuracy})
+    result = estimate(scene, check=check, comm=todo.session.comm, progress=todo.progress)
+    todo.finish(result)
+    if write is not None and todo.session.first:
+        within = result.summary["needed"]["accuracy"]
+        remark = f"# {todo.scene.name} with the theory and the effects that it needs for {within:g}.\n\n"
+        write_variant(todo.scene, result.needed, write, remark)
+        todo.session.say([f"scene with what it needs in {write}"])
 
 
 @command(computes=False)
@@ -199,17 +218,12 @@ def cost(
     ] = None,
     of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip, frequencies or campbell")] = None,
     theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
-    elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,
-    degrees: Annotated[str | None, typer.Option("--degrees", metavar="K,…", help="polynomial degrees")] = None,
-    steps: Annotated[str | None, typer.Option("--steps", metavar="H,…", help="time steps (s)")] = None,
     schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
-    repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
     budget: Annotated[str | None, typer.Option("--budget", metavar="TIME", help="of the study: 60s, 2min, 1h")] = None,
-    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
 ) -> None:
     """Measure error against computing time of SCENE over settings.
 
-    Settings are theory, mesh, degree, time step and scheme.
+    Each theory and scheme has a ladder of settings, each about twice as dear as the last.
     """
     from rotfem import cost as study
 
@@ -220,15 +234,10 @@ def cost(
         quick=quick,
         accuracy=accuracy,
         output=of,
-        repeat=repeat,
         budget=budget,
-        folder=todo.results.path,
-        resume=resume,
         theories=listed("--theories", theories, str),
-        elements=listed("--elements", elements, int),
-        degrees=listed("--degrees", degrees, int),
-        steps=listed("--steps", steps, float),
         schemes=listed("--schemes", schemes, str),
+        comm=todo.session.comm,
         progress=todo.progress,
     )
     todo.finish(result)

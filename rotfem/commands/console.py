@@ -129,8 +129,6 @@ class Session:
         if self._folder is None:
             return ""
         path = self._folder.path
-        if (path / "cost.jsonl").exists():
-            return f"; what was measured is in {path}, and the same command goes on from there"
         found = kept_in(path) if self._folder.summary else []
         return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
 

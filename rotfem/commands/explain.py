@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
+from rotfem.accuracy.answer import Answers, Setting, distance
+from rotfem.accuracy.explain import (
+    HISTORY,
+    MODES,
+    RESOLVED,
+    STEADY,
+    Change,
+    Compared,
+    Needed,
+    compared,
+    fails,
+    needed,
+)
+from rotfem.accuracy.explain import explain as explain_change
+from rotfem.accuracy.outputs import tip
+from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
-from rotfem.analysis.march import Steps
+from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.schemes import State
 from rotfem.commands.advice import frozen_inputs
 from rotfem.commands.first_state import first_state
-from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
-from rotfem.commands.run import run
-from rotfem.errors import ComputationError, SceneError, input_of
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
-from rotfem.mechanics.theories import Theory
+from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.distance import distance, distance_each, of_columns
-from rotfem.refinement.explain import MODES, RESOLVED, Case, Change, Explanation
 from rotfem.results import ExplainResult
+from rotfem.results.distance import Series, Spectrum
 from rotfem.scene import Scene, as_scene
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[Any]
+T = TypeVar("T")
 
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
-#: The same of steps.
-FINE = {"negligible": "fine enough", "noticeable": "in error by {:.1%}", "large": "too coarse: in error by {:.1%}"}
-
-#: What the notes of a check are marked with.
-FULL = " of the full model"
+#: Accuracy that the model is for if a scene names none: what is negligible is so for it.
+ACCURACY = 1e-2
 
 
 def explain(
@@ -53,176 +68,311 @@ def explain(
     progress: Progress | None = None,
     terms: Mapping[str, Work] | None = None,
 ) -> ExplainResult:
-    """Return how much every effect and every theory changes the outputs of a scene.
+    """Return how much every effect and every theory changes the outputs of a scene, and the model that it calls for.
 
     Args:
         scene: scene, path of a scene file, or nested tables.
-        check: also run the full models of every row, so that the true change stands next to the estimate.
+        check: also compute every change with the scene's own mesh and steps, next to the estimate.
         comm: MPI communicator; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
         terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
 
     Raises:
-        SceneError: the scene is not valid, or a check is asked for with terms that are not registered.
+        SceneError: the scene is not valid.
     """
     scene = as_scene(scene)
-    if check and terms:
-        raise SceneError(scene.file, "--check", None, "runs the scene's own models; register the terms as effects")
     with input_of(scene.file):
-        case = case_of(scene, terms)
-        of = Explanation(case, communicator(case.problem, comm))
-        return _explained(scene, of, check, progress or (lambda share: None), comm)
+        of = Explanation(scene, terms or {}, comm)
+        check_rotating(of.problem, "explain")
+        return of.result(check, progress or (lambda share: None))
 
 
-def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
-    """Return the case of a scene: its problem, and what is to be computed of it."""
-    time, unsteady = scene.time, ""
+def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:
+    """Return the effects of a history or steady state that its accuracy calls for; all of them where nothing is known.
+
+    Raises:
+        InputError: the scene cannot be computed.
+    """
+    assert scene.accuracy is not None
+    of = Explanation(scene, terms, comm, modes=False)
+    of.compute(lambda share: None, ("effect",))
+    return of.needed(scene.accuracy, theory=False)
+
+
+@dataclass
+class Outcome:
+    """An output of one model.
+
+    Attributes:
+        output: of it.
+        steps: that were taken; 0 of what has none.
+        size: largest displacement over the length, or rotation in rad.
+        stable, round_off: not asked for.
+    """
+
+    output: Any
+    steps: int = 0
+    size: float = 0.0
+    stable: bool | None = None
+    round_off: float | None = None
+
+    def result(self) -> Any:
+        """Return the output, which is all there is."""
+        return self.output
+
+
+class Explanation:
+    """The changes of a scene's outputs by effects and theories.
+
+    Args:
+        scene: validated.
+        terms: of a script, by name.
+        comm: MPI communicator.
+        modes: whether modes are among the outputs.
+
+    Attributes:
+        effects: all with data; `own` is the setting of the scene, with those of its model.
+        absent: output ↦ why there is none; `answers` are those of the others.
+        system: of the own model on the scene's mesh, effects switched by constants.
+        speed: of the modes, rad/s.
+        failed: output ↦ why the own model has none.
+        pairs: output ↦ the own model in the settings of the comparison.
+        changes: every effect there are data for, then every other theory.
+    """
+
+    def __init__(self, scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm, modes: bool = True):
+        self.given, self.terms, self.comm = scene, terms, comm
+        changes: dict[str, Any] = {
+            **dict.fromkeys(("accuracy", "accuracy_of", "accuracy_budget")),
+            "output.error": False,
+        }
+        if scene.time is not None:  # an accuracy may have given its steps
+            changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
+        if scene.model.effects == "needed":
+            changes["model.effects"] = "auto"
+        self.scene = scene = scene.replace({**changes, "model.frame": "rotating"})
+        self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
+        self.inner, whole = communicator(problem, comm), problem.replace(effects=None)
+        self.effects, kind = whole.effective_effects(), problem.structure.type
+        self.own = replace(Setting.of(scene), effects=problem.effective_effects())
+        self._systems: dict[tuple[str, str], Any] = {}
+        self.system = self._switched(problem)
+        self.own = replace(self.own, degree=self.system.V.element.basix_element.degree)  # a default differs by cell
+        self.speed = self._reached()
+        self.absent = self._absent()
+        compute = {HISTORY: self._history, STEADY: self._steady, MODES: self._modes}
+        self.answers = {
+            name: Answers(scene, lambda variant, times, of=of: of(variant), moving=name == HISTORY)  # type: ignore[misc]
+            for name, of in compute.items()
+            if name not in self.absent and (modes or name != MODES)
+        }
+        self.failed, self.pairs = dict[str, str](), dict[str, Compared]()
+        self.changes = [Change("effect", name, name in (self.own.effects or ())) for name in self.effects]
+        others = [theory for theory in theories() if theory.holds_for(kind) and theory is not problem.theory]
+        self.changes += [Change("theory", theory.name, False) for theory in others]
+
+    def _absent(self) -> dict[str, str]:
+        """Return output ↦ why there is none of it."""
+        out = {STEADY: "the scene asks for a history"}
+        if self.scene.time is None:
+            out = {HISTORY: "the scene has no [time]"}
+            try:
+                self.scene.check_run()
+                check_steady(self.problem.replace(effects=None))
+            except InputError as error:
+                out[STEADY] = str(error)
+        return out
+
+    def _reached(self) -> float:
+        """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
+        motion, time = self.problem.motion, self.scene.time
+        if motion.hub is None or time is None:
+            return motion.final_speed(0.0 if time is None else time.end)
+        times = np.unique([*np.linspace(0.0, time.end, 2001), *motion.hub.torque.knots])
+        speeds = motion.hub.rigid_speeds(times, self.system.row.rest_inertia())
+        return float(speeds[np.argmax(np.abs(speeds))])
+
+    # --- the outputs of a model -------------------------------------------------------------------------------------
+
+    def _switched(self, problem: Any) -> Any:
+        """Return the system of a problem; those of one theory and mesh are one, with effects switched by constants."""
+        whole = problem.replace(effects=None)
+        key = problem.theory.name, repr(problem.mesh)
+        if key not in self._systems:
+            system = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
+            if system.linear:
+                system.held.check_terms()
+            self._systems[key] = system
+        self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
+        return self._systems[key]
+
+    def _of(self, variant: Scene) -> tuple[Any, Any]:
+        problem = Problem.of(variant, terms=self.terms).replace(outputs={})
+        return problem, self._switched(problem)
+
+    def _history(self, variant: Scene) -> Outcome:
+        problem, system = self._of(variant)
+        return marched(variant, problem, system)
+
+    def _steady(self, variant: Scene) -> Outcome:
+        problem, system = self._of(variant)
+        speed, newton = problem.motion.speed(0.0), Newton.of(variant.solver)
+        q = with_plain_tangents(system, lambda: steady_state(system, speed, newton))
+        values = tip(system, State.at_rest(system, *system.start(q)))
+        return Outcome(Series(np.zeros(1), values[None, :]), size=float(system.size(q)))
+
+    def _modes(self, variant: Scene) -> Outcome:
+        """Compute the eigenvalues by size, without a rigid body, of an overdamped mode the slow one."""
+        _, system = self._of(variant)
+        count, newton = variant.modes.count, Newton.of(variant.solver)
+        analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
+        spinning = with_plain_tangents(system, lambda: analysis.at(self.speed, count))
+        names = analysis.described(spinning).names[: count - int(spinning.rigid)]
+        lasting = [name.rest != "fast" for name in names]
+        return Outcome(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
+
+    # --- what is made of them ---------------------------------------------------------------------------------------
+
+    def compute(self, progress: Progress, kinds: tuple[str, ...] = ("effect", "theory")) -> None:
+        """Compute the changes of some kinds."""
+        changes = [change for change in self.changes if change.kind in kinds]
+        for i, (output, answers) in enumerate(self.answers.items()):
+            own = self.own if output == HISTORY else replace(self.own, scheme=None, tolerance=None, step=None)
+            try:
+                pair = self.pairs[output] = compared(answers, replace(own, max_step=None))
+            except ComputationError as error:
+                self.failed[output] = error.what
+                fails(changes, output, error.what)
+                continue
+            for j, change in enumerate(changes):
+                if not change.refused:
+                    explain_change(change, output, answers, pair)
+                progress((i + (j + 1) / len(changes)) / len(self.answers))
+
+    def needed(self, accuracy: float, theory: bool = True) -> Needed:
+        """Return the model that an accuracy calls for; the own one where an output of it cannot be computed."""
+        effects = self.own.effects or ()
+        if self.failed or not self.pairs:
+            return Needed(self.own.theory, effects)
+        return needed(self.changes, self.own, accuracy, self.answers, self.pairs, theory)
+
+    def check(self, progress: Progress) -> None:
+        """Compute every change in the scene's own setting, too."""
+        there = [change for change in self.changes if not change.refused]
+        for output, answers in self.answers.items():
+            own = self.own if output == HISTORY else replace(self.own, scheme=None, tolerance=None, step=None)
+            for i, change in enumerate(there, start=1):
+                try:
+                    change.truth[output] = distance(answers(own), answers(change.of(own))).size
+                except ComputationError:
+                    change.truth[output] = np.inf
+                progress(i / len(there))
+
+    def result(self, check: bool, progress: Progress) -> ExplainResult:
+        """Return the result of a verb."""
+        started, accuracy = perf_counter(), self.given.accuracy or ACCURACY
+        self.compute(progress)
+        model = self.needed(accuracy)
+        spent = {"estimate": perf_counter() - started, "check": 0.0}
+        if check:
+            self.check(progress)
+            spent["check"] = perf_counter() - started - spent["estimate"]
+        self._switched(self.problem)
+        numbers, theory = groups(self), self.problem.theory
+        rows = [{**change.row(), "why": why(change, theory)} for change in self.changes]
+        found: dict[str, Any] = {
+            **summary("explain", self.given, self.comm, self.inner),
+            "theory": theory.name,
+            "effects": list(self.own.effects or ()),
+            "groups": numbers,
+            "meaning": {name: MEANING[name] for name in numbers},
+            "outputs": list(self.answers),
+            "resolution": RESOLVED,
+            "absent_outputs": self.absent,
+            "absent_effects": {e.name: e.reasons[1] for e in Effect.registry if e.name not in self.effects},
+            "rows": rows,
+            "needed": {
+                "accuracy": accuracy,
+                "theory": model.theory,
+                "effects": list(model.effects),
+                "dropped": list(model.dropped),
+                "change": model.change,
+                "seconds": model.seconds,
+            },
+            "speeds": [self.speed],
+            "warnings": self._doubts(),
+            "timings": {**spent, "total": sum(spent.values())},
+        }
+        return ExplainResult(found, rows)
+
+    def _doubts(self) -> list[str]:
+        """Return warnings about what the estimates are of."""
+        out = [f"{name} of {self.problem.theory.name} cannot be computed: {what}" for name, what in self.failed.items()]
+        if MODES in self.answers:
+            out += [f"modes: {line}" for line in frozen_inputs(self.problem)]
+        if self.given.model.frame == "inertial":
+            out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
+        return out
+
+
+def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+    """Return what a computation gives with the plain tangent; if that fails, with the one that takes longer to compile.
+
+    Raises:
+        ComputationError: it fails with both.
+    """
+    held = system.held
+    if held.linear:
+        return compute()
+    held.plain = True
     try:
-        scene.check_run()
-    except SceneError as error:
-        unsteady = str(error)
-
-    def first(system: Any) -> tuple[Any, Any]:
-        start = first_state(scene, system.model.problem, system, judged=False)
-        return start.q, start.v
-
-    problem = Problem.of(scene, terms=terms)
-    check_rotating(problem, "explain")
-    return Case(
-        problem=problem,
-        steps=None if time is None else Steps.of(time),
-        scheme=None if time is None else scheme_of(time),
-        first=first,
-        mode_count=scene.modes.count,
-        about=scene.modes.about,
-        newton=lambda: Newton.of(scene.solver),
-        unsteady=unsteady,
-    )
+        return compute()
+    except ComputationError:
+        held.plain = False
+        return compute()
+    finally:
+        held.plain = True
 
 
-def _explained(scene: Scene, of: Explanation, check: bool, progress: Progress, comm: MPI.Comm) -> ExplainResult:
-    started, theory = perf_counter(), of.problem.theory
-    changes = of.all()
-    spent = {"estimate": perf_counter() - started, "check": 0.0}
-    if check:
-        check_changes(scene, of, changes, progress)
-        spent["check"] = perf_counter() - started - spent["estimate"]
-    numbers = groups(of)
-    rows = [{**item.row(), "why": why(item, theory)} for item in changes]
-    result: dict[str, Any] = {
-        **summary("explain", scene, comm, of.system.comm),
-        "theory": theory.name,
-        "effects": list(of.own),
-        "groups": numbers,
-        "meaning": {name: MEANING[name] for name in numbers},
-        "outputs": list(of.wanted),
-        "resolution": RESOLVED,
-        "absent_outputs": of.absent,
-        "absent_effects": {e.name: e.reasons[1] for e in Effect.registry if e.name not in of.effects},
-        "rows": rows,
-        "speeds": [of.speed],
-        "warnings": doubts(scene, of),
-        "timings": {**spent, "total": sum(spent.values())},
-    }
-    return ExplainResult(result, rows)
+def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
+    """Return the tip over time of a system, at all steps.
+
+    Raises:
+        ComputationError: it fails, or a linear theory diverges.
+    """
+    time = scene.time
+    assert time is not None
+    start = with_plain_tangents(system, lambda: first_state(scene, problem, system, judged=False))
+    times, tips, largest = list[float](), list[Array](), 0.0
+    for state in March(system, scheme_of(time), Steps.of(time), Newton.of(scene.solver), start.q, start.v):
+        size = float(system.size(state.q))
+        largest = max(largest, size)
+        times.append(state.t)
+        tips.append(tip(system, state))
+        if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
+            raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+    return Outcome(Series(np.array(times), np.array(tips)), len(times) - 1, largest)
 
 
-def doubts(scene: Scene, of: Explanation) -> list[str]:
-    """Return warnings about what the estimates are of."""
-    out = [f"{name} of {of.problem.theory.name} cannot be computed: {what}" for name, what in of.failed.items()]
-    if MODES in of.wanted:
-        out += [f"modes: {line}" for line in frozen_inputs(of.problem)]
-    if scene.model.frame == "inertial":
-        out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
-    return out
-
-
-def why(item: Change, own: Theory) -> str:
+def why(change: Change, own: Theory) -> str:
     """Return in a few words why an effect or theory is in a model or not, and whether it has to be.
 
     Args:
-        item: the change it makes.
+        change: it makes.
         own: theory of the model.
     """
-    failed = "".join(f"; {name}: {text}" for name, text in item.notes.items() if FULL not in name)
-    if item.verdict == "unknown":
-        return ("the error is unknown" if item.kind == "discretisation" else "these steps do not show it") + failed
-    if item.kind == "effect":
-        reason = Effect.registry[item.name].reasons[0]
-        if not item.included:
+    if change.refused:
+        return change.refused
+    failed = "".join(f"; {name}: {text}" for name, text in change.notes.items())
+    if change.verdict == "unknown":
+        return "these steps do not show it" + failed
+    if change.kind == "effect":
+        reason = Effect.registry[change.name].reasons[0]
+        if not change.included:
             reason += ", but it is not in model.effects"
-        return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
-    if item.kind == "discretisation":
-        return FINE[item.verdict].format(item.worst)
-    poorer = Theory.registry[item.name].rank < own.rank
-    return (ENOUGH if poorer else NEEDED)[item.verdict].format(item.worst) + failed
-
-
-# --- the truth ------------------------------------------------------------------------------------------------------
-
-
-def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress: Progress) -> None:
-    """Write the true change into every row: both models run as the scene says, on its own mesh with its own steps.
-
-    Args:
-        scene: as it was given; it runs in the rotating frame with the model of each row.
-        of: the changes.
-        changes: the rows.
-        progress: called with the share of the rows that are done.
-    """
-    increment = min(1e-10, scene.solver.increment_tolerance)  # small differences are wanted
-    exact = {"model.frame": "rotating", "solver.increment_tolerance": increment}
-    scene = scene.replace({**exact, "model.effects": list(of.own), "output.error": False})
-    own, own_notes = full_outputs(scene, of)
-    for i, item in enumerate(changes, start=1):
-        if item.name == "time.tolerance":
-            continue  # adaptive steps have no common times
-        if item.kind == "discretisation":
-            other = finer(scene, item.name)
-        elif item.kind == "effect":
-            kept = set(of.own) ^ {item.name}
-            other = scene.replace({"model.effects": [name for name in of.effects if name in kept]})
-        else:
-            prestress = scene.model.prestress if Theory.registry[item.name].prestress else None
-            other = scene.replace({"model.theory": item.name, "model.prestress": prestress})
-        there, notes = full_outputs(other, of)
-        for name, x in own.items():
-            apart = distance_each if name == MODES else distance
-            item.truth[name] = np.inf if x is None or there[name] is None else apart(x, there[name])
-        item.notes |= {f"{name}{FULL}": text for name, text in (own_notes | notes).items()}
-        progress(i / len(changes))
-
-
-def finer(scene: Scene, name: str) -> Scene:
-    """Return a scene with shorter steps and rows where they were, or on a finer mesh; of a file, of a higher degree."""
-    time = scene.time
-    if name == "time.step" and time is not None and time.step is not None:
-        return scene.replace({"time.step": time.step / 4, "time.output_every": time.output_every * 4})
-    if scene.structure.mesh_file is not None:
-        return scene.replace({"mesh.degree": scene.mesh.degree + 1})
-    elements = scene.mesh.elements
-    return scene.replace({"mesh.elements": [2 * n for n in elements] if isinstance(elements, tuple) else 2 * elements})
-
-
-def full_outputs(scene: Scene, of: Explanation) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them, None of what fails, and why.
-
-    Modes are those at the speed of the explanation.
-    """
-    comm, out, notes = of.system.comm, dict[str, Any](), dict[str, str]()
-    turning = scene.replace({"motion.speed": of.speed}) if of.problem.motion.hub is not None else scene
-    for name in of.wanted:
-        try:
-            if name == MODES:
-                rows = modes(turning, comm=comm).rows  # no rigid body, of an overdamped mode the slow one
-                kept = [r for r in rows if r["label"] != "rigid body" and not r["label"].endswith(", fast")]
-                out[name] = np.array([complex(row["growth"], row["frequency"]) for row in kept])
-            else:
-                history = run(scene, comm=comm).history
-                out[name] = of_columns("tip", history, of.system.structure)
-        except ComputationError as error:
-            out[name], notes[name] = None, error.what
-    return out, notes
+        return f"{reason}; {NEEDED[change.verdict].format(change.worst)}{failed}"
+    poorer = Theory.registry[change.name].rank < own.rank
+    return (ENOUGH if poorer else NEEDED)[change.verdict].format(change.worst) + failed
 
 
 # --- dimensionless numbers --------------------------------------------------------------------------------------------
@@ -247,18 +397,20 @@ def groups(of: Explanation) -> dict[str, float]:
     Args:
         of: its changes, which were computed.
     """
-    case, system = of.case, of.system
-    structure, values = case.problem.structure, of.values
+    system, time, problem = of.system, of.scene.time, of.problem
+    structure, tips = problem.structure, of.pairs.get(HISTORY) or of.pairs.get(STEADY)
+    values = np.empty(0) if MODES not in of.pairs else of.pairs[MODES].own[1].output.values
     # Neither a mesh file's plate nor any other structure need have a length of its own.
     length = float(getattr(structure, "length", None) or system.structure.length)
     at_rest = _frequencies_at_rest(of)
     first = float(at_rest[0]) if at_rest.size else 0.0
-    speeds, rates = _turning(case, system)
+    speeds, rates = _turning(of)
     out = {"speed_ratio": float(np.abs(speeds).max()) / first} if first > 0.0 else {}
     if system.structure.radius > 0.0:
         out["slenderness"] = length / system.structure.radius
-    if of.size > 0.0:
-        out |= {"deflection": of.scale / length, "rotation": of.size}
+    if tips is not None:
+        answer = tips.own[1]
+        out |= {"deflection": answer.output.scale / length, "rotation": getattr(answer.outcome, "size", 0.0)}
     root = getattr(structure, "root_position", structure.hub_radius)
     out["hub_ratio"] = float(np.linalg.norm(root)) / length
     if first > 0.0:
@@ -267,9 +419,9 @@ def groups(of: Explanation) -> dict[str, float]:
         out["damping"] = float(-values[0].real / abs(values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
-    if case.steps is not None and case.steps.step is not None and (at_rest.size or len(values)):
+    if time is not None and time.step is not None and (at_rest.size or len(values)):
         fastest = float(np.abs(values).max()) if len(values) else float(at_rest[-1])
-        out["steps_per_period"] = 2 * np.pi / fastest / case.steps.step
+        out["steps_per_period"] = 2 * np.pi / fastest / time.step
     return out
 
 
@@ -279,18 +431,18 @@ def _frequencies_at_rest(of: Explanation) -> Array:
     held.set_time(0.0, of.problem.motion.at_speed(0.0))
     held.set_state(held.zeros())
     try:
-        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.case.mode_count)).resolved))
+        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.scene.modes.count)).resolved))
     except ComputationError:
         return np.empty(0)
 
 
-def _turning(case: Case, system: Any) -> tuple[Array, Array]:
+def _turning(of: Explanation) -> tuple[Array, Array]:
     """Return Ω and dΩ/dt at some times of the motion; of a free hub those of the rigid structure."""
-    motion, end = case.problem.motion, case.steps.end if case.steps is not None else 0.0
+    motion, end = of.problem.motion, of.scene.time.end if of.scene.time is not None else 0.0
     times = np.linspace(0.0, max(end, motion.settled), 401)
     if motion.hub is None:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-    speeds = motion.hub.rigid_speeds(np.asarray(times), system.row.rest_inertia())
+    speeds = motion.hub.rigid_speeds(np.asarray(times), of.system.row.rest_inertia())
     return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
 
 

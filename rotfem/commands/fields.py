@@ -142,7 +142,7 @@ def axes_along(beam: Any, x: Array, root: Any) -> Array:
     line = beam.reference_line
     chi, zeta = line.angles(x) if line is not None else np.zeros((2, len(x)))
     turned = Rotation.from_euler("ZYX", np.column_stack([chi, -zeta, evaluate(beam.pretwist, x)]))
-    return np.asarray((root * turned).as_matrix())
+    return np.asarray(root @ turned.as_matrix())
 
 
 def columns_of(beam: Any, at: Array | None = None) -> dict[str, Array]:

@@ -48,7 +48,7 @@ def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True
         scene: what is run.
         problem: its problem, with the model and the mesh in use.
         system: the equations of motion of that.
-        judged: whether stability is wanted; a companion starts from what its run starts from.
+        judged: whether stability is wanted; an answer to compare with starts without.
 
     Raises:
         ComputationError: there is no static shape, or no equilibrium, or an unstable one.

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: in a march obeyed between steps, by all ranks; elsewhere held back."""
+"""Ctrl-C and SIGTERM: in a march obeyed between steps, by all ranks; while modules are imported held back."""
 
 from __future__ import annotations
 
@@ -20,16 +20,20 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait where what they raise would be lost, or taken for something else."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+def importing() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM wait, as in the middle of an import what they raise becomes any error.
+
+    No garbage is collected: what is imported stays, and is seen no more.
+    """
     heard: list[tuple[int, FrameType | None]] = []
-    before = {n: signal.signal(n, lambda number, frame: heard.append((number, frame))) for n in SIGNALS}
+    main = threading.current_thread() is threading.main_thread()
+    before = {n: signal.signal(n, lambda *given: heard.append(given)) for n in SIGNALS if main}
+    gc.disable()
     try:
         yield
     finally:
+        gc.freeze()
+        gc.enable()
         for number, handler in before.items():
             signal.signal(number, handler)
     for first, frame in heard[:1]:
@@ -38,18 +42,6 @@ def held_back() -> Iterator[None]:
             handler(first, frame)
         elif handler == signal.SIG_DFL:
             signal.raise_signal(first)
-
-
-@contextmanager
-def importing() -> Iterator[None]:
-    """Hold signals back as `held_back` does, and collect no garbage: what is imported stays, and is seen no more."""
-    gc.disable()
-    try:
-        with held_back():
-            yield
-    finally:
-        gc.freeze()
-        gc.enable()
 
 
 def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:

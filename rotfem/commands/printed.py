@@ -46,6 +46,9 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     if "left_out" in s:
         lines.append(f"not computed, as nothing excites it: {', '.join(s['left_out']['unknowns'])}")
     lines += accuracy_report(s)
+    if dropped := s.get("needed", {}).get("dropped"):
+        together = percent(s["needed"]["change"])
+        lines.append(f"effects left out for the accuracy: {', '.join(dropped)}; together {together}")
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []
@@ -68,8 +71,19 @@ def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 def of_explain(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `explain` prints before and after its tables."""
     absent = ", ".join(f"{name} ({why})" for name, why in s["absent_effects"].items())
-    after = [*accuracy_report(s), *([f"effects without data: {absent}"] if absent else [])]
-    return [f"{s['name']}: {s['theory']} theory, in {s['timings']['total']:.2f} s", effects(s)], after
+    after = [f"effects without data: {absent}"] if absent else []
+    before = [f"{s['name']}: {s['theory']} theory, in {s['timings']['total']:.2f} s", effects(s)]
+    return before, [*after, called_for(s["needed"])]
+
+
+def called_for(found: dict[str, Any]) -> str:
+    """Return the line about the model that a scene calls for."""
+    out = f"for {found['accuracy']:g}: {', '.join([found['theory'], *found['effects']])}"
+    if found["dropped"]:
+        out += f"; not needed: {', '.join(found['dropped'])}"
+    if found["change"] > 0.0:
+        out += f"; together {percent(found['change'])}"
+    return out if found["seconds"] is None else out + "; {:.2g} s instead of {:.2g} s".format(*found["seconds"])
 
 
 def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:

@@ -188,7 +188,7 @@ class Problem(ProblemData):
                 motion=motion,
                 mesh=scene.mesh,
                 theory=scene.model.theory,
-                effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
+                effects=scene.model.effects if isinstance(scene.model.effects, tuple) else None,
                 loads=Loads.of(scene.loads, scene.structure, motion.angle).pitched(motion.pitch),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,

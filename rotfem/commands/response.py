@@ -20,7 +20,7 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.frequency_response import (
     FrequencyResponse,
-    Output,
+    HarmonicOutput,
     hub_output,
     root_of_free_hub,
     root_output,
@@ -102,7 +102,7 @@ def response(
         return result_of(scene, answers, (asked, peaks, undamped), direct, started)
 
 
-def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[Output]]:
+def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[HarmonicOutput]]:
     """Return f̂ of the harmonic loads at an equilibrium, what they add to the forces on the owned unknowns, and outputs.
 
     The equilibrium is left in the system.

@@ -25,6 +25,7 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
 from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, error_of, to_accuracy, with_error
+from rotfem.commands.explain import needed_model
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
@@ -32,7 +33,7 @@ from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
-from rotfem.errors import ComputationError, Stopped, input_of
+from rotfem.errors import ComputationError, InputError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
@@ -425,9 +426,18 @@ def simulate(
             check_steady(Problem.of(scene, terms=terms, outputs=outputs))
         if scene.accuracy is not None:
             check_of(scene, ("tip", ROOT_MOMENT), "run")
-            answers.times = rows_of(scene)
-            done: RunResult = to_accuracy(answers, output_of(scene), clock, comm, lambda result, errors: result)
+            answers.times, more = rows_of(scene), dict[str, Any]()
+            if scene.model.effects == "needed" and output_of(scene) == "tip":
+                found = needed_model(scene, terms or {}, comm)
+                answers.scene = scene.replace({"model.effects": list(found.effects)})
+                answers.neglected = {"effects": found.change}
+                more = {"needed": {"dropped": list(found.dropped), "change": found.change}}
+            done: RunResult = to_accuracy(
+                answers, output_of(scene), clock, comm, lambda result, errors: result.with_summary(**more)
+            )
             return done
+        if scene.model.effects == "needed":
+            raise InputError("model.effects", "needed", "needs accuracy, which says what is needed")
         simulation = Simulation(scene, Problem.of(scene, terms=terms, outputs=outputs), store)
         also, critical = hints_of_start(scene, simulation.problem), simulation.monitor.critical
         simulation.log.advice = advise(scene, hint, critical=critical, also=also)

@@ -27,7 +27,7 @@ from rotfem.numerics.linear import DirectSolver, combine, set_diagonal
 
 Array = npt.NDArray[np.float64]
 
-ONE = np.ones(1)
+UNIT_FACTOR = np.ones(1)
 
 
 class AffineSystem(System):
@@ -107,7 +107,7 @@ class AffineSystem(System):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
-        c = self._products(np.concatenate([ONE, *(constant.value.ravel() for constant in self._all_constants)]))
+        c = self._products(np.concatenate([UNIT_FACTOR, *(constant.value.ravel() for constant in self._all_constants)]))
         first, self.settled = self._coefficients is None, True
         changed = np.asarray(c != self._coefficients)
         self._coefficients = c
@@ -134,7 +134,7 @@ class AffineSystem(System):
     def coefficients(self, motion: Motion) -> Array:
         """Return the factor of every piece at t = 0 of another motion, shape (n,), without setting it."""
         values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
-        return self._products(np.concatenate([ONE, *(np.ravel(values[name]) for name in self._constants)]))
+        return self._products(np.concatenate([UNIT_FACTOR, *(np.ravel(values[name]) for name in self._constants)]))
 
     def factors(self, values: Mapping[str, Array], n: int) -> Array:
         """Return the factor of every piece at n times, shape (n, pieces), from the values (n, size) of constants."""

@@ -34,10 +34,10 @@ Ratios = float | tuple[float, ...] | Mapping[str, tuple[float, ...]]
 EFFECT = "damping"
 
 #: Key of a scene for messages.
-KEY = "structure.damping.modal"
+DAMPING_KEY = "structure.damping.modal"
 
 #: How many modes a single ratio is for.
-FIRST = 10
+MODES_OF_ONE_RATIO = 10
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def damping_by_mode(system: Any) -> ByMode | None:
         return None
     ratios = damping.modal
     if system.model.fixed:
-        raise InputError(KEY, ratios, 'needs model.frame = "rotating": modes at rest turn with the hub')
+        raise InputError(DAMPING_KEY, ratios, 'needs model.frame = "rotating": modes at rest turn with the hub')
     modes, zeta = damped_modes(system, ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
@@ -157,10 +157,10 @@ def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
         for name in ratios:
             if name not in known:
                 why = f"a {system.structure.type} has no such family; allowed: {', '.join(known)}"
-                raise InputError(f"{KEY}.{name}", list(ratios[name]), why)
+                raise InputError(f"{DAMPING_KEY}.{name}", list(ratios[name]), why)
     else:
-        named = {"": ratios if isinstance(ratios, tuple) else (ratios,) * FIRST}
-    count = sum(map(len, named.values())) + (FIRST if isinstance(ratios, Mapping) else 0)
+        named = {"": ratios if isinstance(ratios, tuple) else (ratios,) * MODES_OF_ONE_RATIO}
+    count = sum(map(len, named.values())) + (MODES_OF_ONE_RATIO if isinstance(ratios, Mapping) else 0)
     while True:
         modes = modes_at_rest(system, count)
         energies = family_products(system, modes.shapes, modes.massed)
@@ -174,7 +174,7 @@ def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
             name = short[0]
             value = list(named[name]) if name else ratios
             why = f"has more ratios than there are {name}modes on this mesh: {len(of[name])}"
-            raise InputError(f"{KEY}.{name}".rstrip(". "), value, why)
+            raise InputError(f"{DAMPING_KEY}.{name}".rstrip(". "), value, why)
         count *= 2
     zeta = np.zeros(len(modes.omega))
     for name, given in named.items():

@@ -28,7 +28,7 @@ from rotfem.equations.nonlinear import assembled
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import SAME, Assembler
+from rotfem.numerics.forms import SAME_PATTERN, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
 from rotfem.numerics.projection import summed, with_ghosts
 from rotfem.structures.root_reaction import RootReaction
@@ -74,7 +74,7 @@ def geometric_pieces(pieces: Pieces, parts: list[Any], compiled: Any) -> list[tu
     found = [(load, K, frozenset[str]()) for load, K in zip(loads, plain, strict=True)]
     for name in adding:
         for load, K, bare in zip(loads, stiffness([other for other in adding if other != name]), plain, strict=True):
-            K.axpy(-1.0, bare, SAME)
+            K.axpy(-1.0, bare, SAME_PATTERN)
             found.append((load, K, frozenset((name,))))
     for name in adding:
         switches[name].value = 1.0
@@ -153,7 +153,7 @@ class Piece:
 
     def add(self, other: Piece) -> None:
         """Make it the sum with another piece of the same kind and constants."""
-        self.operator.axpy(1.0, other.operator, *(() if self.kind == "f" else (SAME,)))
+        self.operator.axpy(1.0, other.operator, *(() if self.kind == "f" else (SAME_PATTERN,)))
         self.of, self.at_root = self.of | other.of, self.at_root + other.at_root
 
 
@@ -301,7 +301,7 @@ class Pieces:
         found: list[tuple[Key, Any, frozenset[str]]] = []
         for name, parts in self._parts(kind):
             bodiless: dict[Key, Any] = {}
-            same = () if kind == "f" else (SAME,)
+            same = () if kind == "f" else (SAME_PATTERN,)
             apart = self._apart or name == INTERNAL.name  # strains are wanted without what an effect adds to them
             for part in [(p,) for p in parts] if apart else [parts]:
                 self._set_switches((name, *part))
@@ -326,7 +326,7 @@ class Pieces:
         Pieces follow from values at 0, 1 and −1, which determine a polynomial of second degree; c|v|v is none.
         """
         values = {entry: 1.7 + 0.3 * i for i, entry in enumerate(self.entries_of(name))}
-        left, same = self.assemble_at(kind, values), () if kind == "f" else (SAME,)
+        left, same = self.assemble_at(kind, values), () if kind == "f" else (SAME_PATTERN,)
         size = left.norm()
         for key, operator in parts.items():
             factor = float(np.prod([values[entry] for entry in key]))
@@ -362,7 +362,7 @@ class Pieces:
         def at(*entries: tuple[tuple[str, int], float]) -> Any:
             return self.assemble_at(kind, dict(entries))
 
-        same = () if kind == "f" else (SAME,)
+        same = () if kind == "f" else (SAME_PATTERN,)
         if len(key) == 2 and key[0] != key[1]:
             operator = at((key[0], 1.0), (key[1], 1.0))
             for entry in key:
@@ -409,7 +409,7 @@ class Pieces:
         if others or self.structure.released:
             K = K.copy()
         for other in others:
-            K.axpy(1.0, other, SAME)
+            K.axpy(1.0, other, SAME_PATTERN)
         if self.structure.released:
             restrained(K, self._hinged)
         return K

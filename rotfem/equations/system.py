@@ -89,7 +89,7 @@ class System(Solutions, ABC):
         self.comm, self.shared = model.comm, model.comm.size > 1
         self.q, self.v, self.a, _ = self.structure.k.functions
         self.V = self.structure.V
-        #: Values of the frame's constants at the last few times, as iterations and companions come back to them.
+        #: Values of the frame's constants at the last few times, as iterations come back to them.
         self._frame_at = lru_cache(maxsize=8)(lambda t, *_: self.model.frame.values(self.motion, t))
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()

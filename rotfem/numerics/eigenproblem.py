@@ -166,10 +166,10 @@ def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
 BACKWARD_TOLERANCE = 1e-8
 
 #: Part of the median |λ| below which an eigenvalue counts as zero where zero is an eigenvalue.
-ZERO = 1e-3
+ZERO_EIGENVALUE = 1e-3
 
 #: Relative distance at which two eigenvalues count as equal, or a real part as zero.
-SAME = 1e-6
+EQUAL_EIGENVALUES = 1e-6
 
 
 @dataclass
@@ -240,11 +240,9 @@ class Pencil(Sendable):
 
     Attributes:
         owner: kept alive with the matrices.
-        near: complex columns (owned rows) near the vectors of a large conservative pencil; None where none are known.
         factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
     """
 
-    near: Array | None = None
     factor: DirectSolver | None = None
 
     def __init__(self, M: Any, C: Any, K: Any):
@@ -322,7 +320,7 @@ class Pencil(Sendable):
         except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
             pairs = self._solve(count, 0.1 * self._smallest)
         lam = pairs.values
-        opposite = np.abs(lam[1:] + lam[:-1]) < ZERO * np.abs(lam[1:])
+        opposite = np.abs(lam[1:] + lam[:-1]) < ZERO_EIGENVALUE * np.abs(lam[1:])
         return pairs.select(np.flatnonzero(np.append(True, ~opposite | (pairs.bounds[1:] < 1.0))[: len(lam)]))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
@@ -339,7 +337,7 @@ class Pencil(Sendable):
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
-        small = ZERO * self._smallest if target > 0.0 else 0.0
+        small = ZERO_EIGENVALUE * self._smallest if target > 0.0 else 0.0
         if self.damped and heavily_damped(values[self.stiff(right) & (np.abs(values) > small)]):
             return self._damped(count, target)
         if self.conservative:
@@ -378,7 +376,7 @@ class Pencil(Sendable):
         start, more = shapes / d[:, None], min(2 * count, count + MORE)
         values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit)
         vectors = d[:, None] * right, d[:, None] * left
-        return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
+        return self._checked(self.unit * values, vectors, errors, ZERO_EIGENVALUE * self.unit if target > 0.0 else 0.0)
 
     def _checked(self, values: Array, vectors: tuple[Array, Array], errors: Array, small: float) -> Eigenpairs:
         """Return pairs with their bounds, from right and left vectors.
@@ -416,7 +414,7 @@ class Pencil(Sendable):
         solver.factorise()
         self.factored += perf_counter() - started
         scale = unknown_scale(self.M, self.K, 1.0).array
-        out = gyroscopic_pairs((self.M, self.C, self.K), scale, solver, count, self.near)
+        out = gyroscopic_pairs((self.M, self.C, self.K), scale, solver, count)
         self.factor = solver
         return out
 

@@ -23,7 +23,7 @@ from ufl.corealg.multifunction import MultiFunction
 from rotfem.listeners import Compiling, cpu_time
 from rotfem.numerics import compat, form_cache
 
-SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+SAME_PATTERN = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
 class Assembler:

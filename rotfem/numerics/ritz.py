@@ -82,7 +82,7 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
 
 
 def gyroscopic_pairs(
-    matrices: tuple[Any, Any, Any], scale: Array, solver: DirectSolver, count: int, near: Array | None = None
+    matrices: tuple[Any, Any, Any], scale: Array, solver: DirectSolver, count: int
 ) -> tuple[Array, Array, Array]:
     """Return (λ, x, normwise backward error) of at least `count` pairs nearest to zero, and of their conjugates.
 
@@ -91,7 +91,6 @@ def gyroscopic_pairs(
         scale: D of the unknowns that D K D has a diagonal of about one with, owned rows.
         solver: of K.
         count: number of pairs; of conjugate ones, one counts.
-        near: complex columns (owned rows) near the vectors, if any are known.
 
     Raises:
         ComputationError: they do not converge, or K is singular.
@@ -99,9 +98,7 @@ def gyroscopic_pairs(
     comm: MPI.Comm = matrices[0].comm.tompi4py()
     wanted, random, d = 2 * count + 2, np.random.default_rng(comm.rank), scale[:, None]
     norms = [_norm(comm, A, d * random.choice([-1.0, 1.0], d.shape), d) for A in matrices]
-    W = solver.solve_all(times(matrices[0], d * random.standard_normal((len(d), wanted if near is None else 2))))
-    if near is not None:  # which may lack a mode
-        W = np.hstack([near.real[:, : count + 1], near.imag[:, : count + 1], W])
+    W = solver.solve_all(times(matrices[0], d * random.standard_normal((len(d), wanted))))
     Q: Array = np.zeros((len(d), 0))
     projected: list[Array] = [np.zeros((0, 0)) for _ in matrices]
     for _ in range(12):

@@ -91,15 +91,8 @@ COLUMNS = {
     "truth": ("relative change of the full models", "1"),
     "worst": ("largest estimated relative change", "1"),
     "step": ("time step", "s"),
-    "error": ("error of the discretisation, relative", "1"),
-    "model_error": ("error of the theory, relative", "1"),
     "total_error": ("error, that of the theory included, relative", "1"),
-    "uncertainty": ("uncertainty of the reference, relative", "1"),
-    "time": ("time of one run without set-up, median", "s"),
-    "time_min": ("shortest time of one run", "s"),
-    "time_max": ("longest time of one run", "s"),
-    "cpu_time": ("processor time of one run, median", "s"),
-    "setup": ("time of the set-up, median", "s"),
+    "cost": ("CPU time of one run with its set-up, median", "s"),
 }
 
 

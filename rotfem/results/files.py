@@ -41,6 +41,8 @@ def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
         return "is what has been read; must be another file"
     if path.is_dir():
         return "is a folder; must be the path of a file"
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}; must be in one that is there"
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             return ""

@@ -160,11 +160,10 @@ class ExplainResult(Rows):
 
     Attributes:
         summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
-        rows: one dictionary an effect, a theory, and steps and mesh: `kind`, `name`, `included`, `why`, `estimate`
+        rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate`
             (output ↦ relative change; None where it is unknown, below `summary["resolution"]` round-off), `worst`,
-            `verdict`; `bounds`,
-            outputs whose change is only known to be below the estimate; with a check `truth` (output ↦ relative change
-            of the full models).
+            `verdict`; `bounds`, outputs whose change is only known to be below the estimate; with a check `truth`
+            (output ↦ relative change in the scene's own setting).
     """
 
     index = ("name",)
@@ -184,6 +183,12 @@ class ExplainResult(Rows):
     def verdicts(self) -> dict[str, str]:
         """Effect or theory ↦ "negligible", "noticeable", "large" or "unknown": how much it changes the outputs."""
         return {row["name"]: row["verdict"] for row in self.rows}
+
+    @property
+    def needed(self) -> dict[str, Any]:
+        """Keys ↦ values of the scene with the theory and the effects that it calls for (see `summary["needed"]`)."""
+        found = self.summary["needed"]
+        return {"model.theory": found["theory"], "model.effects": found["effects"]}
 
     @property
     def outputs(self) -> list[str]:
@@ -217,7 +222,7 @@ class ExplainResult(Rows):
         """Return an estimate as text; one below the resolution as smaller than that."""
         estimate, resolution = row["estimate"][output], self.summary["resolution"]
         if estimate is None:
-            return "unknown"
+            return "–" if row["verdict"] == "not available" else "unknown"
         if 0.0 < estimate < resolution:
             return "<" + per_cent(resolution)
         return ("<" if output in row.get("bounds", ()) else "") + per_cent(estimate)

@@ -60,22 +60,33 @@ def titled(width: float, height: float, title: str) -> tuple[Figure, float]:
     return figure, height / (height + above)
 
 
-def panels_over(x: str, number: int, title: str, below: float = 0.0) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels over the column x in one to three columns, the first of them filled first.
+def panels_over(
+    x: str, number: int, title: str, *, columns: int = 0, below: float = 0.0, beside: float = 0.0
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels over an abscissa, the first column filled first.
 
-    Places are fixed, as what Matplotlib finds by itself takes it longer than all the rest. Inches are left free below.
+    Places are fixed, as what Matplotlib finds by itself takes it longer than all the rest.
+
+    Args:
+        x: label of the abscissa.
+        number: of the panels.
+        title: of the figure.
+        columns: of panels; one to three, by their number, if 0.
+        below: what is left free there for a legend, inch.
+        beside: likewise.
     """
-    columns = 1 if number <= 3 else 2 if number <= 12 else 3
+    columns = columns or (1 if number <= 3 else 2 if number <= 12 else 3)
     rows = -(-max(number, 1) // columns)
-    width, height = max(5.0 * columns, 7.0), ROW * rows + BELOW + below
+    cell, height = max(5.0, 7.0 / columns), ROW * rows + BELOW + below
+    width = cell * columns + beside
     figure, part = titled(width, height, title)
-    across, panels = width / columns - LEFT - RIGHT, []
+    across, panels = cell - LEFT - RIGHT, []
     for i in range(number):
-        left, bottom = width / columns * (i // rows) + LEFT, height - ROW * (i % rows + 1)
+        left, bottom = cell * (i // rows) + LEFT, height - ROW * (i % rows + 1)
         box = left / width, bottom / height * part, across / width, (ROW - 0.3) / height * part
         panels.append(panel := figure.add_axes(box))
         lowest = i % rows == rows - 1 or i == number - 1
-        dress(panel, label(x) if lowest else "")
+        dress(panel, x if lowest else "")
         panel.tick_params(labelbottom=lowest)
         panel.ticklabel_format(axis="y", scilimits=(-3, 4))
         panel.yaxis.set_offset_position("right")
@@ -85,7 +96,7 @@ def panels_over(x: str, number: int, title: str, below: float = 0.0) -> tuple[Fi
     return figure, panels
 
 
-def power_of_ten(value: float, place: int | None = None) -> str:
+def power_of_ten(value: float, place: float = 0.0) -> str:
     """Return a tick of a logarithmic axis; Matplotlib's own takes a grammar of formulas."""
     return "10" + str(round(np.log10(value))).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
@@ -118,7 +129,7 @@ def stacked(
     """
     units, ranges = units or {}, ranges or {}
     shown, title = not_zero({**columns, **ranges}, title)
-    figure, panels = panels_over(x, len(shown), title)
+    figure, panels = panels_over(label(x), len(shown), title)
     for panel, name in zip(panels, shown, strict=True):
         said = described(name)[0]
         if x == "t":
@@ -205,7 +216,7 @@ def shapes_figure(result: ModesResult) -> Figure:
     first = next(iter(result.shapes.values()))
     names = [n for n in first if (n.startswith("u") or n == "theta1") and not n.endswith("_imag")]
     title = f"{heading(result)}, largest displacement 1, imaginary parts dashed"
-    figure, panels = panels_over("x", len(result.shapes), title, below=0.3)
+    figure, panels = panels_over(label("x"), len(result.shapes), title, below=0.3)
     drawn = {}
     for panel, (row, columns, frequency) in zip(panels, result.with_shapes(), strict=True):
         x = columns["x"]
@@ -236,16 +247,13 @@ def response_figure(result: ResponseResult) -> Figure:
     rows: dict[tuple[str, str], list[str]] = {}
     for name in shown:
         rows.setdefault((name.partition("_")[0], described(name)[1]), []).append(name)
-    figure = Figure(figsize=(10.0, 2.1 * max(len(rows), 1) + 1.2), layout="constrained")
-    figure.suptitle(title, fontsize=10, wrap=True)
-    if not rows:
-        return figure
-    panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
+    across = f"frequency of the load ({units.frequency})"
+    figure, panels = panels_over(across, 2 * len(rows), title, columns=2, beside=1.1)
     x = units.frequencies(result.frequencies)
     mark = "." if len(x) == 1 else ""
-    for (left, right), names in zip(panels, rows.values(), strict=True):
-        dress(left, y=f"amplitude {shown_unit(names[0])}")
-        dress(right, y="phase (°)")
+    for left, right, names in zip(panels, panels[len(rows) :], rows.values(), strict=False):
+        left.set_ylabel(f"amplitude {shown_unit(names[0])}")
+        right.set_ylabel("phase (°)")
         for c, name in enumerate(names):
             direct = result.direct[:, own[name]]
             left.semilogy(x, np.abs(direct), marker=mark, lw=1.3, color=f"C{c}")
@@ -261,9 +269,8 @@ def response_figure(result: ResponseResult) -> Figure:
         left.yaxis.set_major_formatter(power_of_ten)
         right.set(ylim=(-190, 190), yticks=np.arange(-180, 181, 90))
         right.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
-    panels[0, 0].set_xlim(*(x[[0, -1]] if len(x) > 1 else 0.5 * x[0] * np.array([1, 3])))
-    for panel in panels[-1]:
-        panel.set_xlabel(f"frequency of the load ({units.frequency})")
+        for panel in (left, right):
+            panel.set_xlim(*(x[[0, -1]] if len(x) > 1 else 0.5 * x[0] * np.array([1, 3])))
     return figure
 
 

@@ -93,9 +93,10 @@ class Result(ABC):
         Raises:
             KeyError: there is none of that name.
         """
-        if name not in self.table.numbers:
-            raise KeyError(f"no number {name!r} in the table; there are {', '.join(self.table.numbers)}")
-        return np.asarray(self.table.grid(name)[1], dtype=np.float64)
+        table = self.table
+        if name not in (numbers := table.numbers):
+            raise KeyError(f"no number {name!r} in the table; there are {', '.join(numbers)}")
+        return np.asarray(table.grid(name)[1], dtype=np.float64)
 
     def texts(self) -> dict[str, str]:
         """Return file name ↦ text of the tables."""
@@ -126,9 +127,12 @@ class Result(ABC):
         return self.table.variables()
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the result as labelled arrays (see `arrays`) with `units` and `long_name` among their attributes."""
-        names = ("command", "name", "theory", "frame", "kind", "status")
-        return dataset(self.arrays(), {name: self.summary[name] for name in names if name in self.summary})
+        """Return the result as labelled arrays (see `arrays`) with `units` and `long_name` among their attributes.
+
+        The attribute `frame` of the whole says along whose axes components are.
+        """
+        names, frame = ("command", "name", "theory", "frame", "kind", "status"), {"frame": "rotating"}
+        return dataset(self.arrays(), frame | {name: self.summary[name] for name in names if name in self.summary})
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the files into a folder, in the place of the results that are there; return their paths.

@@ -46,8 +46,8 @@ RESULTS = re.compile(
     r"(stations|checkpoint)\.(h5|npz)"
 )
 
-#: Names of what `cost`, `campbell` and `sweep` go on with, which stays.
-KEPT = ("cost.jsonl", "speeds.npz", "points")
+#: Names of what `campbell` and `sweep` go on with, which stays.
+KEPT = ("speeds.npz", "points")
 
 
 class ResultFolder(AbstractContextManager["ResultFolder"]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, StrictBool
+from pydantic import AfterValidator, ConfigDict, StrictBool
 
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.loads import Signal, TimeFunction, function_of
@@ -35,7 +35,7 @@ def _check_pulses(pulses: Matrix) -> Matrix:
 
 
 Speed = Annotated[Number, unit("rad/s")]
-Pulses = Annotated[tuple[Vector, ...], Field(min_length=1), AfterValidator(_check_pulses), unit("s", "s", "N*m")]
+Pulses = Annotated[tuple[Vector, ...], AfterValidator(_check_pulses), unit("s", "s", "N*m")]
 
 
 class Motion(SceneModel):

@@ -28,8 +28,7 @@ from rotfem.scene.values import (
 
 #: A number, a taper (of a mesh from anywhere), or region ↦ number.
 Thickness = Annotated[
-    Annotated[Tapered[Positive], Tag("<profile>")]
-    | Annotated[dict[str, Positive], Tag("<table>"), Field(min_length=1)],
+    Annotated[Tapered[Positive], Tag("<profile>")] | Annotated[dict[str, Positive], Tag("<table>")],
     Discriminator(lambda value: "<table>" if isinstance(value, dict) else "<profile>"),
 ]
 
@@ -121,8 +120,8 @@ class PlateStructure(StructureTable):
         geometry = self._way(self.WAYS)
         material = self._way(self.MATERIALS)
         check_one_hub(self.hub_radius, self.hub_offset)
-        if isinstance(self.thickness, dict) and geometry.name != "mesh":
-            raise problem("thickness", self.thickness, "thickness by region needs a mesh")
+        if isinstance(self.thickness, dict) and (geometry.name != "mesh" or not self.thickness):
+            raise problem("thickness", self.thickness, "thickness by region needs a mesh, and one for every region")
         if isinstance(self.thickness, tuple) and self.length is not None:
             with problems_at("thickness", self.thickness):
                 check_start(self.thickness)

@@ -391,7 +391,7 @@ def check_frame(structure: Any, motion: Motion, model: Model) -> None:
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
     structure.damping.check_inertial()
     for effect in registry.effects:
-        if effect.of_rotation and model.effects != "auto" and effect.name in model.effects:
+        if effect.of_rotation and isinstance(model.effects, tuple) and effect.name in model.effects:
             why = 'is not a separate effect with frame = "inertial"; it comes from the motion of the clamp'
             raise problem("model.effects", list(model.effects), f'"{effect.name}" {why}')
 

@@ -27,7 +27,9 @@ from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
-    return "auto" if value == "auto" else as_names(value, registry.effects.names, "an effect", '"auto" or ')
+    if value in ("auto", "needed"):
+        return str(value)
+    return as_names(value, registry.effects.names, "an effect", '"auto", "needed" or ')
 
 
 Degree = Annotated[int, Field(strict=True, ge=1, le=6)]
@@ -47,7 +49,8 @@ class Model(SceneModel):
 
     Attributes:
         theory: name of a registered theory, the order of the strain measure.
-        effects: "auto", or names of registered effects, those to include.
+        effects: "auto", names of registered effects, those to include, or "needed": those that the accuracy of a run
+            calls for.
         frame: frame to which displacements refer.
         prestress: stresses in the geometric stiffness of the prestressed linear theories of beams: "axial" forces, or
             "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".

@@ -285,7 +285,6 @@ _ALLOWED = {
     "bool_type": "must be true or false",
     "string_type": "must be a text",
     "tuple_type": "must be a list",
-    "too_short": "must have at least {min_length} entries",
     "too_long": "must have at most {max_length} entries",
     "model_type": _TABLE,
     "model_attributes_type": _TABLE,
@@ -295,7 +294,8 @@ _ALLOWED = {
 
 def scene_error(file: str, error: ValidationError) -> SceneError:
     """Return the problems found by validation as one error."""
-    first, *others = [_problem(dict(details)) for details in error.errors(include_url=False)]
+    found = [_problem(dict(details)) for details in error.errors(include_url=False)]
+    first, *others = {(each.key, each.allowed): each for each in found}.values()  # once where two entries are missing
     return SceneError(file, *first, others)
 
 

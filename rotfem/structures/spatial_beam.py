@@ -27,7 +27,6 @@ import ufl
 from basix.ufl import element
 from dolfinx import fem
 from mpi4py import MPI
-from scipy.spatial.transform import Rotation
 from ufl import cross
 
 from rotfem.errors import InputError
@@ -273,15 +272,17 @@ class SpatialBeam(Beam):
         return self._from_reference(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
 
     @property
-    def root_turned(self) -> Rotation:
-        """The turn of axes at the root by precone and first pitch, numbers as in `_undeformed_triad`."""
-        return Rotation.from_euler("YX", [-self.data.precone, self._first_pitch])
+    def root_turned(self) -> Array:
+        """The turn of axes at the root by precone and first pitch, (3, 3), numbers as in `_undeformed_triad`."""
+        (c, s), (d, t) = ((np.cos(a), np.sin(a)) for a in (self.data.precone, self._first_pitch))
+        precone, pitch = [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]], [[1.0, 0.0, 0.0], [0.0, d, -t], [0.0, t, d]]
+        return np.asarray(np.array(precone) @ pitch)
 
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed axis are in the frame, (n, 3) in m, by their coordinates."""
         x, line = coordinates["x"], self.data.reference_line
         along = np.column_stack([x, np.zeros((len(x), 2))]) if line is None else line.at(x)[0]
-        return np.asarray(self.data.root_position + self.root_turned.apply(along))
+        return np.asarray(self.data.root_position + along @ self.root_turned.T)
 
     def oriented(self, values: Array) -> Array:
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""

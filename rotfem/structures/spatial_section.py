@@ -56,7 +56,14 @@ def radius_of(C: Any) -> Any:
 
 
 #: Strains in the order of the section matrices, and the stiffness of each.
-STRAINS = {"axial": "EA", "shear_2": "GA2", "shear_3": "GA3", "torsion": "GJ", "bending_2": "EI2", "bending_3": "EI3"}
+STIFFNESS_OF = {
+    "axial": "EA",
+    "shear_2": "GA2",
+    "shear_3": "GA3",
+    "torsion": "GJ",
+    "bending_2": "EI2",
+    "bending_3": "EI3",
+}
 
 #: Part of the largest entry below which an entry of a mass matrix or an inertia tensor counts as zero.
 NEGLIGIBLE = 1e-12
@@ -267,8 +274,8 @@ class SectionForms:
             c, s = self._turned
             for i in (1, 4):
                 epsilon[i : i + 2] = [c * epsilon[i] + s * epsilon[i + 1], c * epsilon[i + 1] - s * epsilon[i]]
-        stiffness = (self._beam.section[name] for name in STRAINS.values())
-        return [Strain(n, e, c, measure) for n, e, c in zip(STRAINS, epsilon, stiffness, strict=True)]
+        stiffness = (self._beam.section[name] for name in STIFFNESS_OF.values())
+        return [Strain(n, e, c, measure) for n, e, c in zip(STIFFNESS_OF, epsilon, stiffness, strict=True)]
 
     def _full_strains(self, epsilon: list[Any], measure: Any) -> list[Strain]:
         """Return ½ ε·C ε = ½ C_11 (ε_1 + Σ_j C_1j ε_j / C_11)² + ½ Σ_ij (C_ij − C_1i C_1j / C_11) ε_i ε_j, i, j > 1.

@@ -7,6 +7,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from tests.beams import STRUCTURE
+
 ROOT = Path(__file__).resolve().parents[2]
 
 Tables = dict[str, Any]
@@ -18,7 +20,7 @@ SCENES: dict[Path, Tables] = {
     for path in sorted((ROOT / folder).glob("*.toml"))
 }
 
-_SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+_SECTION = STRUCTURE["section"]
 _BEAM = {"type": "planar_beam", "length": 10.0, "hub_radius": 0.5, "tip_mass": 0.1, "tip_inertia": 0.01}
 _BEAM |= {"section": _SECTION, "damping": {"kelvin_voigt": 1e-4, "rayleigh": [0.1, 1e-4]}}
 _MESH = {"elements": 2, "degree": 2}

@@ -10,8 +10,9 @@ import tomli_w
 
 from rotfem import SceneError
 from rotfem.scene import load_scene
+from tests.beams import STRUCTURE
 
-BEAM = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+BEAM = STRUCTURE["section"]
 BLADE = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
 STRUCTURES = {
     "planar": {"type": "planar_beam", "length": 10.0, "section": BEAM},
@@ -57,7 +58,7 @@ model.theory='reisner' -> did you mean "reissner"?
 model.theory='exact' -> "consistent_linear"
 model.effects=['corolis'] -> did you mean "coriolis"?
 model.effects=['euler', 'euler'] -> twice
-model.effects='all' -> "auto" or a list
+model.effects='all' -> a list of coriolis
 accuracy=0.001; output={error=false} -> @output.error cannot be combined with accuracy
 model={frame='inertial', theory='linear'} -> @model.frame reissner
 model.frame='inertial'; motion={type='torque', hub_inertia=1.0} -> @model.frame torque

@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 import rotfem
-from rotfem.commands.cost.result import write_tuned
-from rotfem.commands.cost.settings import own_setting
+from rotfem.accuracy.tuned import write_variant
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.blades.windio import MOST_YAML
 from tests import blade_decks as decks
@@ -294,7 +293,7 @@ def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
     beam = {"type": "spatial_beam", "length": decks.LENGTH, "section": section}
     tables = {"structure": beam, "motion": {"type": "constant", "speed": 0.0}}
     scene = Scene.from_dict(tables, directory=tmp_path)
-    tuned = load_scene(write_tuned(scene, own_setting(scene, "frequencies"), tmp_path / "deeper" / "tuned.toml", ""))
+    tuned = load_scene(write_variant(scene, {"mesh.degree": 2}, tmp_path / "deeper" / "tuned.toml", ""))
     found = tuned.tables["structure"]
     assert found == {**beam, "section": {**section, "from": "../blade", "EA": "../EA.csv"}}
     assert tuned.structure == scene.structure

@@ -24,6 +24,7 @@ import rotfem
 from rotfem.commands.problem import Problem
 from rotfem.equations import model as model_module
 from rotfem.numerics import eigenproblem, forms
+from tests.beams import STRUCTURE
 
 TABLE = Path(__file__).with_name("counts.json")
 
@@ -34,7 +35,7 @@ BEAM: dict[str, Any] = {
     "structure": {
         "type": "planar_beam",
         "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+        "section": STRUCTURE["section"],
     },
     "mesh": {"elements": 4, "degree": 3},
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},

@@ -25,7 +25,6 @@ ORDER = (
     "structures",
     "equations",
     "analysis",
-    "refinement",
     "accuracy",
     "commands",
 )
@@ -161,13 +160,21 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
         "rotfem.scene",
         "rotfem.results",
         "rotfem.results.plots",
-        "rotfem.commands.cost.result",
+        "rotfem.accuracy.cost",
         "rotfem.commands.cli",
     ],
 )
 def test_nothing_of_fenicsx_is_loaded(module: str) -> None:
     """As above, but with all that the module pulls in: a bad scene is refused before FEniCSx is loaded."""
     code = f"import sys, {module}; print(*sorted({FENICSX!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE.parent, check=True)
+    assert done.stdout.split() == []
+
+
+def test_a_plain_run_loads_what_it_uses() -> None:
+    """Tables of pandas, splines and figures take as long to load as FEniCSx does."""
+    heavy = {"bokeh", "matplotlib", "pandas", "pint", "pyvista", "scipy", "xarray"}
+    code = f"import sys, rotfem; rotfem.run; print(*sorted({heavy!r} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE.parent, check=True)
     assert done.stdout.split() == []
 

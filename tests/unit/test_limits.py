@@ -13,8 +13,9 @@ import rotfem
 from rotfem.errors import InputError, Problem, SceneError, printable, show
 from rotfem.scene import Scene, load_scene
 from rotfem.structures.structure import check_memory
+from tests.beams import STRUCTURE
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+SECTION = STRUCTURE["section"]
 TABLES: dict[str, Any] = {
     "structure": {"type": "planar_beam", "length": 10.0, "section": SECTION},
     "motion": {"type": "constant", "speed": 6.0},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -86,12 +85,6 @@ def test_the_angle_of_a_table_is_zero_at_the_start(kind: str, start: float) -> N
     """Rows that end before t = 0, that reach over it, and that begin after it."""
     m = motion({"type": "table", "table": [[start, 3.0], [start + 1.0, 3.0]], "interpolation": kind})
     assert (m.angle(0.0), m.angle(4.0)) == pytest.approx((0.0, 12.0), abs=1e-12)
-
-
-def test_table_from_a_file(tmp_path: Path) -> None:
-    (tmp_path / "speed.csv").write_text("t,speed\n0,1\n1,3\n2,4\n")
-    tables = copy.deepcopy(BEAM) | {"motion": {"type": "table", "table": "speed.csv", "interpolation": "linear"}}
-    assert motion_of(Scene.from_dict(tables, directory=tmp_path)).speed(0.5) == pytest.approx(2.0)
 
 
 def test_a_spin_up_is_the_same_at_many_times_at_once() -> None:

@@ -66,9 +66,9 @@ def test_a_folder_is_made_where_that_is_possible(tmp_path: Path) -> None:
 
 def test_what_a_study_goes_on_with_is_no_obstacle(tmp_path: Path) -> None:
     (tmp_path / "points").mkdir()
-    (tmp_path / "cost.jsonl").write_text("{}\n")
+    (tmp_path / "speeds.npz").write_bytes(b"")
     run_result(1.0).write(tmp_path)
-    assert {"points", "cost.jsonl"} < set(os.listdir(tmp_path))
+    assert {"points", "speeds.npz"} < set(os.listdir(tmp_path))
 
 
 def test_no_link_is_followed(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_names_of_all_files_are_known() -> None:
         assert all(RESULTS.fullmatch(name) for name in result.texts())
     for name in ("fields.bp", "modes.xdmf", "mode_12.gif", "M.npz", "cost.csv", "campbell.png", "checkpoint.npz"):
         assert RESULTS.fullmatch(name), name
-    for name in ("notes.txt", "my_history.csv", "history.csv.bak", "cost.jsonl", "scene.toml", "mode_x.gif"):
+    for name in ("notes.txt", "my_history.csv", "history.csv.bak", "speeds.npz", "scene.toml", "mode_x.gif"):
         assert not RESULTS.fullmatch(name), name
 
 

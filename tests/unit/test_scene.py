@@ -27,8 +27,9 @@ from rotfem.scene import (
     load_scene,
 )
 from rotfem.scene.motion import TableMotion
+from tests.beams import STRUCTURE
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+SECTION = STRUCTURE["section"]
 PLANAR = {"type": "planar_beam", "length": 10.0, "section": SECTION}
 SPATIAL_SECTION = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
 SPATIAL = {"type": "spatial_beam", "length": 2.0, "section": SPATIAL_SECTION}
@@ -115,9 +116,9 @@ def test_time_parameters_belong_to_the_scheme() -> None:
     alpha = scene(time={"end": 1, "step": 0.1}).time
     assert alpha is not None
     assert (alpha.scheme, alpha.parameters) == ("generalised_alpha", {"spectral_radius": 0.9})
-    newmark = scene(time={"end": 1, "tolerance": 1e-4, "scheme": "newmark"}).time
+    newmark = scene(time={"end": 1, "step": 0.1, "scheme": "newmark"}).time
     assert newmark is not None
-    assert (newmark.parameters, newmark.step) == ({"beta": 0.25, "gamma": 0.5}, None)
+    assert newmark.parameters == {"beta": 0.25, "gamma": 0.5}
 
 
 def test_plate_elements_may_be_one_number() -> None:
@@ -209,53 +210,46 @@ def test_to_dict_shows_functions_by_name() -> None:
 
 def test_replace() -> None:
     s = scene(time={"end": 1, "step": 0.1})
-    newmark = s.replace({"time.scheme": "newmark", "time.step": None, "time.tolerance": 1e-3})
-    assert newmark.time is not None
+    adaptive = s.replace({"time.scheme": "esdirk4", "time.step": None, "time.tolerance": 1e-3})
+    assert adaptive.time is not None
     assert s.time is not None
-    assert (newmark.time.scheme, newmark.time.step, newmark.time.tolerance) == ("newmark", None, 1e-3)
-    assert (s.time.step, newmark.name) == (0.1, s.name)
+    assert (adaptive.time.scheme, adaptive.time.step, adaptive.time.tolerance) == ("esdirk4", None, 1e-3)
+    assert (s.time.step, adaptive.name) == (0.1, s.name)
     with pytest.raises(SceneError, match="model.theory"):
         s.replace({"model.theory": "exact"})
 
 
 # --- effects --------------------------------------------------------------------------------------------------------
 
+SPUN = "coriolis centrifugal rotary_inertia"
+TORQUE = "motion={type='torque', hub_inertia=1"
+#: Override of a beam at constant speed ↦ the effects that it has.
+EFFECTS = {
+    "modes.count=6": SPUN,
+    "motion.speed=0": "rotary_inertia",
+    "motion={type='spin_up', speed=6, duration=15}": f"{SPUN} euler",
+    "motion={type='table', table=[[0, 0], [1, 0]]}": "rotary_inertia",
+    "motion={type='table', table=[[0, 0], [1, 1]]}": f"{SPUN} euler",
+    f"{TORQUE}, coupled=false}}": f"{SPUN} euler",
+    f"{TORQUE}}}": f"{SPUN} euler hub_coupling",
+    "motion.base_acceleration=[1, 0]": f"{SPUN} base",
+    "motion.base_acceleration=[0, 0]": SPUN,
+    "loads.gravity=[0, -9.81]": f"{SPUN} gravity",
+    "structure.section.rotary_inertia=0": "coriolis centrifugal",
+    "structure.damping.kelvin_voigt=1e-3": f"{SPUN} damping",
+    "structure.root.lag_stiffness=0": f"{SPUN} root_springs",
+    "structure.tip_inertia=1e-3": f"{SPUN} tip_mass",
+    "model.frame='inertial'": "rotary_inertia",
+    "model.effects=['gravity', 'tip_mass', 'damping', 'base', 'centrifugal']": "centrifugal",
+    "model.effects=[]": "",
+}
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({}, {"coriolis", "centrifugal", "rotary_inertia"}),
-        ({"motion__speed": 0}, {"rotary_inertia"}),
-        ({"motion__speed": 0, "structure__section": SECTION | {"rotary_inertia": 0}}, set()),
-        ({"motion": SPIN_UP}, {"coriolis", "centrifugal", "euler", "rotary_inertia"}),
-        ({"motion": {"type": "table", "table": [[0, 0], [1, 0]]}}, {"rotary_inertia"}),
-        (
-            {"motion": {"type": "table", "table": [[0, 0], [1, 1]]}},
-            {"coriolis", "centrifugal", "euler", "rotary_inertia"},
-        ),
-        (
-            {"motion": {"type": "torque", "hub_inertia": 1, "coupled": False}},
-            {"coriolis", "centrifugal", "euler", "rotary_inertia"},
-        ),
-        (
-            {"motion": {"type": "torque", "hub_inertia": 1}},
-            {"coriolis", "centrifugal", "euler", "rotary_inertia", "hub_coupling"},
-        ),
-        ({"motion__base_acceleration": [1, 0]}, {"coriolis", "centrifugal", "rotary_inertia", "base"}),
-        ({"motion__base_acceleration": [0, 0]}, {"coriolis", "centrifugal", "rotary_inertia"}),
-        ({"loads__gravity": [0, -9.81]}, {"coriolis", "centrifugal", "rotary_inertia", "gravity"}),
-        ({"structure__damping__kelvin_voigt": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "damping"}),
-        ({"structure__root": {"lag_stiffness": 0}}, {"coriolis", "centrifugal", "rotary_inertia", "root_springs"}),
-        ({"structure__tip_inertia": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "tip_mass"}),
-        ({"model__frame": "inertial", "motion": SPIN_UP | {"base_acceleration": [1, 0]}}, {"rotary_inertia", "base"}),
-        ({"model__effects": ["gravity", "tip_mass", "damping", "base", "centrifugal"]}, {"centrifugal"}),
-        ({"model__effects": []}, set()),
-    ],
-)
-def test_effective_effects(changes: dict[str, Any], expected: set[str]) -> None:
-    effects = rotfem.Problem.of(scene(**changes)).effective_effects()
-    assert set(effects) == expected
-    assert list(effects) == [name for name in rotfem.registry.effects.names if name in expected]
+
+@pytest.mark.parametrize("override", EFFECTS)
+def test_effective_effects(scene_file: Path, override: str) -> None:
+    effects = rotfem.Problem.of(load_scene(scene_file, [override])).effective_effects()
+    assert set(effects) == set(EFFECTS[override].split())
+    assert list(effects) == [name for name in rotfem.registry.effects.names if name in effects]
 
 
 def test_point_masses_are_tip_masses() -> None:

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rotfem.commands.interrupts import SIGNALS, held_back
+from rotfem.commands.interrupts import SIGNALS, importing
 
 #: Runs the command line with Ctrl-C in the middle of its imports.
 INTERRUPTED = """
@@ -35,7 +35,7 @@ def test_signals_wait_for_the_end_of_what_they_would_spoil(number: signal.Signal
     went_on = []
 
     def collect() -> None:
-        with held_back():
+        with importing():
             signal.raise_signal(number)
             went_on.append(True)
 

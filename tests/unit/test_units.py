@@ -13,12 +13,13 @@ from rotfem.commands.campbell import parse_speeds
 from rotfem.results.columns import ShownUnits
 from rotfem.scene.table import SceneModel, in_units
 from rotfem.units import quantity
+from tests.beams import STRUCTURE
 
 BEAM: dict[str, Any] = {
     "structure": {
         "type": "planar_beam",
         "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4},
+        "section": STRUCTURE["section"],
     },
     "motion": {"type": "constant", "speed": 6.0},
 }

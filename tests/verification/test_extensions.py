@@ -16,6 +16,7 @@ import ufl
 import rotfem
 from rotfem import registry
 from rotfem.errors import SceneError
+from tests.beams import STRUCTURE
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 
@@ -23,7 +24,7 @@ FILES = Path(__file__).resolve().parents[2] / "demos" / "extensions"
 KINDS = (registry.theories, registry.effects, registry.schemes, registry.shapes, registry.outputs)
 
 #: The beam of Kane, Ryan & Banerjee 1987 as Simo & Vu-Quoc 1986 have it.
-KRB = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+KRB = STRUCTURE["section"]
 
 
 @pytest.fixture

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("unestimated")
 
 Array = npt.NDArray[Any]
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+SECTION = STRUCTURE["section"]
 
 
 def beam(viscosity: float, mass_rate: float, speed: float, count: int, **changes: Any) -> dict[str, Any]:

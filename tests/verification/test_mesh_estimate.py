@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from rotfem import ModesResult, campbell, modes
-from rotfem.refinement.estimate import ASYMPTOTIC
+from rotfem.accuracy.errors import ASYMPTOTIC
+from tests.beams import STRUCTURE
 
 BEAM = {
     "type": "planar_beam",
     "length": 10.0,
-    "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4},
+    "section": STRUCTURE["section"],
 }
 MASSES = {**BEAM, "masses": [{"x": x, "mass": 0.1} for x in (2.0, 4.0, 6.0, 8.0)]}
 EI = [[0.0, 60.0], [0.5, 60.0], [0.51, 1.4e4], [10.0, 1.4e4]]

@@ -155,6 +155,16 @@ def test_jeffcott_rotor() -> None:
 
 
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_unequal_shaft_is_unstable_between_its_two_frequencies(theory: str) -> None:
+    """√(48 EI/(m L³)) of both directions bound one range (Genta 2005, chapter 6): 1e-4, the bearings and the mesh."""
+    scene = shaft_on_bearings(1e9, model={"theory": theory})
+    scene["structure"]["section"] |= {"EI3": 1.3 * EI}
+    (found,) = rotfem.campbell(scene, "75:115:5", orders=0).instabilities
+    assert found.kind == "static instability"
+    np.testing.assert_allclose([found.speed, found.until], np.sqrt(np.array([1.0, 1.3]) * 48.0 * EI / 10.0), rtol=1e-4)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
 @pytest.mark.parametrize("speed", [0.0, 40.0, 200.0])
 def test_damped_bearings(theory: str, speed: float) -> None:
     """Bearings that yield: the eigenvalues in the fixed frame do not depend on the speed, and none grows.

@@ -23,6 +23,7 @@ from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
 from rotfem.mechanics.theories import ladder
 from rotfem.registry import effects
+from tests.beams import STRUCTURE
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 
@@ -483,7 +484,7 @@ PLANAR: dict[str, Any] = {
         "hub_radius": 0.3,
         "tip_mass": 0.2,
         "tip_inertia": 0.01,
-        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+        "section": STRUCTURE["section"],
     },
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 4.0, "base_acceleration": [0.3, 0.2]},
     "loads": {"gravity": [1.0, -2.0], "tip_force": {"value": [0.2, 2.0], "kind": "follower"}, "tip_moment": 5.0},

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from tests.beams import STRUCTURE
 from tests.hard.case import Case
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+SECTION = STRUCTURE["section"]
 TIME = {"end": 1.0, "step": 0.01}
 
 

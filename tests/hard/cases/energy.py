@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from tests.beams import STRUCTURE
 from tests.hard.case import Case
 
-SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+SECTION = STRUCTURE["section"]
 BEAM = {"type": "planar_beam", "length": 10.0, "section": SECTION}
 MESH = {"elements": 3, "degree": 3}
 

@@ -1,1 +1,0 @@
-"""How good an answer is, and how a better one is found: companions, distances, refinement."""

@@ -1,0 +1,128 @@
+"""An accuracy that is asked for is kept, against answers that are finer by far."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.results.distance import Series
+from tests.beams import STRUCTURE
+
+SECTION = STRUCTURE["section"]
+BEAM = {"type": "planar_beam", "length": 10.0, "section": SECTION}
+T = np.linspace(0.0, 3.0, 151)
+SCENES: dict[str, dict[str, Any]] = {
+    "spin-up": {
+        "structure": BEAM,
+        "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
+        "time": {"end": 6.0},
+    },
+    "pulse": {
+        "structure": {**BEAM, "tip_mass": 3.0},
+        "motion": {"type": "constant", "speed": 2.0},
+        "loads": {"tip_force": [[0.0, 0.0, 0.0], [0.1, 0.0, 40.0], [0.2, 0.0, 0.0]]},
+        "time": {"end": 3.0},
+    },
+    "hub": {
+        "structure": BEAM,
+        "motion": {"type": "torque", "hub_inertia": 200.0, "pulses": [[0.0, 1.0, 300.0]]},
+        "time": {"end": 3.0},
+    },
+    "plate": {
+        "structure": {
+            **{"type": "plate", "length": 0.7, "width": 0.35, "thickness": 0.004},
+            **{"E": 7e10, "nu": 0.33, "rho": 2700.0},
+        },
+        "motion": {"type": "constant", "speed": 10.0},
+        "loads": {"pressure": [[0, 0], [0.05, 90.0], [0.1, 0]]},
+        "time": {"end": 0.2},
+    },
+}
+FINE = {"plate": {"elements": [12, 6], "degree": 3}}
+
+
+def output(run: Any, of: str) -> Series:
+    """Return the tip, or the moment at the root, over a run."""
+    names = [n for n in run.history if n.startswith("tip_u" if of == "tip" else "root_m")]
+    return Series(run.t, np.column_stack([run.history[n] for n in names]))
+
+
+@cache
+def reference(name: str) -> Any:
+    scene = SCENES[name]
+    time = {**scene["time"], "tolerance": 2e-6 if name != "plate" else 2e-5}
+    time["output_step"] = time["end"] / 1000
+    mesh = FINE.get(name, {"elements": 6, "degree": 5})
+    return rotfem.run({**scene, "time": time, "mesh": mesh, "output": {"error": False}})
+
+
+@pytest.mark.parametrize(
+    ("name", "accuracy", "of"),
+    [
+        *((name, accuracy, "tip") for name in ("spin-up", "pulse", "hub") for accuracy in (1e-2, 1e-3, 1e-4)),
+        ("plate", 1e-2, "tip"),
+        ("plate", 1e-3, "tip"),
+        ("pulse", 1e-2, "root_moment"),
+    ],
+)
+def test_the_truth_is_as_near_as_was_asked(name: str, accuracy: float, of: str) -> None:
+    run = rotfem.run({**SCENES[name], "accuracy": accuracy, "accuracy_of": of})
+    found = run.summary["accuracy"]
+    assert found["met"]
+    assert found["estimated"] <= accuracy
+    assert output(reference(name), of).apart(output(run, of)).size <= accuracy
+    assert len(run.t) == 1001
+    settings = run.summary["settings"]
+    assert settings[-1].get("extrapolated") or name == "plate"
+    assert [row["error"] for row in settings] == sorted((row["error"] for row in settings), reverse=True)
+
+
+def test_rows_are_where_they_were_asked_for() -> None:
+    for time in ({"output_step": 0.05}, {"step": 0.01, "output_every": 5}):
+        run = rotfem.run({**SCENES["spin-up"], "time": {"end": 1.0, **time}, "accuracy": 1e-2})
+        np.testing.assert_allclose(run.t, np.linspace(0.0, 1.0, 21), atol=1e-12)
+
+
+def test_what_cannot_be_met_is_said_and_files_and_summary_are_of_one_answer() -> None:
+    with pytest.raises(rotfem.ComputationError, match="accuracy of 1e-12 was not met") as caught:
+        rotfem.run({**SCENES["spin-up"], "time": {"end": 0.5}, "accuracy": 1e-12})
+    best = caught.value.result  # type: ignore[attr-defined]
+    assert best.summary["status"] == "failed"
+    chosen = best.summary["accuracy"]["chosen"]
+    assert best.summary["elements"] == chosen["elements"]
+    time = {"end": 0.5, "tolerance": chosen["tolerance"], "output_step": 0.5 / 1000}
+    mesh = {"elements": chosen["elements"], "degree": chosen["degree"]}
+    again = rotfem.run({**SCENES["spin-up"], "time": time, "mesh": mesh, "output": {"error": False}})
+    np.testing.assert_allclose(again.history["tip_u2"], best.history["tip_u2"], rtol=0, atol=1e-9)
+
+
+def test_a_theory_out_of_its_range_does_not_meet_an_accuracy() -> None:
+    bent = {"tip_force": [[0.0, 0.0, 0.0], [1.0, 0.0, 60.0], [2.0, 0.0, 60.0]]}
+    scene = {"structure": BEAM, "motion": {"type": "constant", "speed": 0.0}, "loads": bent, "time": {"end": 2.0}}
+    with pytest.raises(rotfem.ComputationError, match=r"most of it \(theory\)"):
+        rotfem.run({**scene, "model": {"theory": "consistent_linear"}, "accuracy": 1e-2})
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6])
+def test_frequencies_to_an_accuracy(accuracy: float) -> None:
+    scene = {"structure": BEAM, "motion": {"type": "constant", "speed": 4.0}, "modes": {"count": 5}}
+    exact = rotfem.modes({**scene, "mesh": {"elements": 16, "degree": 5}}).frequencies
+    found = rotfem.modes({**scene, "accuracy": accuracy})
+    assert found.summary["accuracy"]["met"]
+    assert np.max(np.abs(found.frequencies / exact - 1.0)) <= accuracy
+    assert max(row["mesh_error"] for row in found.rows) <= accuracy
+    diagram = rotfem.campbell({**scene, "accuracy": accuracy}, [0.0, 2.0, 4.0])
+    last = [row["frequency"] for row in diagram.rows if row["speed"] == 4.0]
+    assert np.max(np.abs(np.sort(last) / exact - 1.0)) <= accuracy
+
+
+def test_an_accuracy_of_something_else_is_refused() -> None:
+    scene = {"structure": BEAM, "motion": {"type": "constant", "speed": 4.0}, "accuracy": 1e-3}
+    with pytest.raises(rotfem.InputError, match="accuracy_of"):
+        rotfem.modes({**scene, "accuracy_of": "tip"})
+    with pytest.raises(rotfem.InputError, match="accuracy_of"):
+        rotfem.run({**scene, "accuracy_of": "frequencies"})
