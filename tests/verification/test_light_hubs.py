@@ -50,7 +50,7 @@ def test_momentum_from_nowhere_is_in_the_error() -> None:
     """The explicit first stage of esdirk4 starts with accelerations after the jump that its steps do not resolve."""
     result = run(THROWN | {"time": {"end": 0.1, "step": 0.005, "scheme": "esdirk4"}, "output": {"error": True}})
     assert abs(result.history["angular_momentum"][-1] - result.history["impulse"][-1]) > 1.0
-    assert result.summary["error"]["total"] > 0.5
+    assert result.summary["error"]["total"] > 0.1
 
 
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
