@@ -204,7 +204,7 @@ class Needed:
         effects: those that it has.
         dropped: names of effects that it has not.
         change: of the answer by all that is dropped together, and by the theory, relative.
-        seconds: CPU times of this model and of the own one in the setting of the comparison, s; None without one.
+        seconds: CPU times of a history with this model and with the own one in the setting of the comparison, s.
     """
 
     theory: str
@@ -254,6 +254,7 @@ def needed(
             change = np.inf
         if change <= allowed:
             dropped = tuple(c.name for c in sorted(out, key=lambda c: c.worst) if c.kind == "effect")
-            return Needed(there, kept, dropped, change, (both[0][1].seconds, both[0][0].seconds))
+            times = (both[0][1].seconds, both[0][0].seconds) if HISTORY in pairs else None  # others are too short
+            return Needed(there, kept, dropped, change, times)
         out.remove(max(out, key=lambda c: c.worst))
     return Needed(own.theory, effects)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,7 @@ from rotfem.results.distance import Series, Spectrum
 from rotfem.scene import Scene, as_scene
 
 Array = npt.NDArray[Any]
+T = TypeVar("T")
 
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
@@ -215,7 +216,8 @@ class Explanation:
 
     def _steady(self, variant: Scene) -> Outcome:
         problem, system = self._of(variant)
-        q = steady_state(system, problem.motion.speed(0.0), Newton.of(variant.solver))
+        speed, newton = problem.motion.speed(0.0), Newton.of(variant.solver)
+        q = with_plain_tangents(system, lambda: steady_state(system, speed, newton))
         values = tip(system, State.at_rest(system, *system.start(q)))
         return Outcome(Series(np.zeros(1), values[None, :]), size=float(system.size(q)))
 
@@ -224,7 +226,7 @@ class Explanation:
         _, system = self._of(variant)
         count, newton = variant.modes.count, Newton.of(variant.solver)
         analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
-        spinning = analysis.at(self.speed, count)
+        spinning = with_plain_tangents(system, lambda: analysis.at(self.speed, count))
         names = analysis.described(spinning).names[: count - int(spinning.rigid)]
         lasting = [name.rest != "fast" for name in names]
         return Outcome(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
@@ -313,6 +315,25 @@ class Explanation:
         return out
 
 
+def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+    """Return what a computation gives with the plain tangent; if that fails, with the one that takes longer to compile.
+
+    Raises:
+        ComputationError: it fails with both.
+    """
+    held = system.held
+    if held.linear:
+        return compute()
+    held.plain = True
+    try:
+        return compute()
+    except ComputationError:
+        held.plain = False
+        return compute()
+    finally:
+        held.plain = True
+
+
 def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
     """Return the tip over time of a system, at all steps.
 
@@ -321,7 +342,8 @@ def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
     """
     time = scene.time
     assert time is not None
-    start, times, tips, largest = first_state(scene, problem, system, judged=False), list[float](), list[Array](), 0.0
+    start = with_plain_tangents(system, lambda: first_state(scene, problem, system, judged=False))
+    times, tips, largest = list[float](), list[Array](), 0.0
     for state in March(system, scheme_of(time), Steps.of(time), Newton.of(scene.solver), start.q, start.v):
         size = float(system.size(state.q))
         largest = max(largest, size)

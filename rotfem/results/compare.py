@@ -9,18 +9,18 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline, NearestNDInterpolator
+from scipy.interpolate import NearestNDInterpolator
 from scipy.optimize import linear_sum_assignment
 
 from rotfem.errors import InputError
 from rotfem.results.columns import ShortTable, described, label, largest, number, per_cent
+from rotfem.results.distance import Series, relative
 from rotfem.results.files import read_csv
 from rotfem.results.result import Result, Row, Rows
 from rotfem.results.result_set import read_summary
@@ -48,21 +48,14 @@ class Curve:
         """Name of the vector that the quantity is a component of, and unit: what has one scale. A branch is its own."""
         return self.name if self.unit == "rad/s" else self.name.rstrip("123"), self.unit
 
-    def at(self, x: Values) -> Values:
-        """Return the values at other places, by a cubic spline between its own; a steady state has but one."""
-        if len(self.x) == 1 or np.array_equal(x, self.x):
-            return np.broadcast_to(self.y[-1], x.shape) if len(self.x) == 1 else self.y
-        return np.asarray(CubicSpline(self.x, self.y)(x))
-
-    def within(self, other: Curve) -> Curve:
-        """Return the part where there is another curve too."""
-        if len(self.x) == 1 or len(other.x) == 1:
-            return Curve(self.name, self.unit, self.x[-1:], self.y[-1:])
-        both = (self.x >= other.x[0]) & (self.x <= other.x[-1])
-        if not np.any(both):
+    def beside(self, other: Curve) -> tuple[Values, Values, Values]:
+        """Return common places, and the values of this curve and of another one there (see `Series.beside`)."""
+        pair = (Series(one.x, one.y[:, None]) for one in (self, other))
+        here, there = next(pair).beside(next(pair))
+        if not len(here.times):
             said = f"{self.x[0]:g} … {self.x[-1]:g} and {other.x[0]:g} … {other.x[-1]:g}"
             raise InputError(self.name, said, "must overlap")
-        return Curve(self.name, self.unit, self.x[both], self.y[both])
+        return here.times, here.values[:, 0], there.values[:, 0]
 
 
 class Compared:
@@ -136,7 +129,7 @@ class CompareResult(Rows):
 
 
 def compare(*results: Result | str | Path) -> CompareResult:
-    """Return how far results are from the first one, at its times, frequencies or speeds as far as both have them.
+    """Return how far results are from the first one, at common times, frequencies or speeds (see `Series.beside`).
 
     Args:
         results: results of one command (`run`, `modes`, `campbell` or `response`), or their folders; two at least.
@@ -187,8 +180,8 @@ def _pairs(a: Mapping[str, Curve], b: Mapping[str, Curve], by_name: bool) -> lis
             if by_name or one.name == other.name:
                 far[i, j] = one.name != other.name
             else:
-                part = one.within(other)
-                far[i, j] = 1.0 + _relative(float(np.mean(np.abs(other.at(part.x) - part.y))), float(np.max(one.y)))
+                _, here, there = one.beside(other)
+                far[i, j] = 1.0 + relative(float(np.mean(np.abs(there - here))), float(np.max(one.y)))
     pairs = [(ones[i], others[j]) for i, j in zip(*linear_sum_assignment(np.minimum(far, 9.0)), strict=True)]
     return [(one, other) for one, other in pairs if not by_name or one.name == other.name]
 
@@ -196,20 +189,19 @@ def _pairs(a: Mapping[str, Curve], b: Mapping[str, Curve], by_name: bool) -> lis
 def _distances(pairs: list[tuple[Curve, Curve]]) -> Iterator[Row]:
     """Yield a row for each pair of curves."""
     scales: dict[tuple[str, str], float] = {}
-    parts = [(a.within(b), b) for a, b in pairs]
-    for a, _ in parts:
-        scales[a.vector] = max(scales.get(a.vector, 0.0), float(np.max(np.abs(a.y))))
-    for a, b in parts:
-        there = b.at(a.x)
-        off = np.abs(there - a.y)
-        rms = np.sqrt(np.trapezoid(off**2, a.x) / np.ptp(a.x)) if np.ptp(a.x) > 0.0 else off[-1]
+    parts = [(a, *a.beside(b)) for a, b in pairs]
+    for a, _, here, _ in parts:
+        scales[a.vector] = max(scales.get(a.vector, 0.0), float(np.max(np.abs(here))))
+    for a, x, here, there in parts:
+        off = np.abs(there - here)
+        rms = np.sqrt(np.trapezoid(off**2, x) / np.ptp(x)) if np.ptp(x) > 0.0 else off[-1]
         yield {
             "quantity": a.name,
             "unit": a.unit,
-            "reference": _peak(a.y),
+            "reference": _peak(here),
             "value": _peak(there),
-            "difference": _relative(float(np.max(off)), scales[a.vector]),
-            "rms": _relative(float(rms), scales[a.vector]),
+            "difference": relative(float(np.max(off)), scales[a.vector]),
+            "rms": relative(float(rms), scales[a.vector]),
         }
 
 
@@ -228,9 +220,9 @@ def _modes(a: Compared, b: Compared) -> tuple[list[Row], list[str]]:
         if there:
             x = np.concatenate([u[name] for name in there])
             y = np.concatenate([_moved(b.nodes, v[name], a.nodes) for name in there])
-            mac[i, j] = _relative(float(np.abs(np.vdot(x, y)) ** 2), float(np.vdot(x, x).real * np.vdot(y, y).real))
+            mac[i, j] = relative(float(np.abs(np.vdot(x, y)) ** 2), float(np.vdot(x, x).real * np.vdot(y, y).real))
         here = ones[i]["frequency"]
-        far[i, j] = _relative(abs(others[j]["frequency"] - here), here)
+        far[i, j] = relative(abs(others[j]["frequency"] - here), here)
     apart = np.not_equal.outer([bool(u) for u in a.shapes], [bool(v) for v in b.shapes])
     for i, j in zip(*linear_sum_assignment(np.minimum(far, 1.0) - mac + 2 * apart), strict=True):
         if apart[i, j]:
@@ -253,7 +245,7 @@ def _critical(a: Compared, b: Compared, branches: set[tuple[str, str]]) -> Itera
             other = min(like, key=lambda o: abs(o["speed"] - one["speed"]))
             there.remove(other)
             name = f"critical speed, {one['kind']} {one['order']}, {one['label']}"
-            off = _relative(abs(other["speed"] - one["speed"]), abs(one["speed"]))
+            off = relative(abs(other["speed"] - one["speed"]), abs(one["speed"]))
             values = {"reference": one["speed"], "value": other["speed"], "difference": off}
             yield {"quantity": name, "unit": "rad/s", **values}
 
@@ -267,10 +259,6 @@ def _moved(nodes: Values, values: Values, to: Values) -> Values:
     return np.asarray(NearestNDInterpolator(nodes, values)(to))
 
 
-def _relative(off: float, size: float) -> float:
-    return off / size if size > 0.0 else 0.0 if off == 0.0 else inf
-
-
 def _peak(y: Values) -> float:
     """Return the value of the largest amount; of amplitudes that itself."""
     largest = y[np.argmax(np.abs(y))]
@@ -280,10 +268,9 @@ def _peak(y: Values) -> float:
 def _curves(columns: dict[str, Values]) -> Iterator[Curve]:
     """Yield the columns of a history over time, or the complex amplitudes of a response over frequency."""
     x = columns.pop("t" if "t" in columns else "frequency")
-    last = np.append(np.diff(x) > 0.0, True)  # of two rows at one time
     waves = {n: columns[n] * np.exp(1j * columns[f"{n}_phase"]) for n in columns if f"{n}_phase" in columns}
     for name, y in (waves or columns).items():
-        yield Curve(name, described(name)[1], x[last], y[last])
+        yield Curve(name, described(name)[1], x, y)
 
 
 def _branches(rows: list[Row]) -> Iterator[Curve]:

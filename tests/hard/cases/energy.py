@@ -64,10 +64,13 @@ CASES = [
         tolerance=0.1,  # from row to row it fluctuates by some per cent
         source="conserved",
         expected=expected,
+        words="Newton"
+        if expected == "failed"
+        else "",  # nothing damps what the steps feed, until they have no solution
         nightly=(theory, radius) != ("second_order", 1.0),
     )
     for theory in ("reissner", "second_order", "von_karman")
-    for radius, end, expected in ((1.0, 11.0, "right"), (0.9, 200.0, "right"))
+    for radius, end, expected in ((1.0, 11.0, "failed"), (0.9, 200.0, "right"))
 ]
 CASES += [
     Case(
