@@ -317,7 +317,8 @@ class Sweep:
         """Return the modes at a speed, its equilibrium continued from start."""
         known = self.known.pop(speed, None)
         self.solves += known is None
-        return SpeedPoint(known or self.analysis.at(speed, self.count + SPARE, start), requested)
+        found = known or self.analysis.at(speed, self.count + SPARE, start)
+        return SpeedPoint(found.first(self.count + SPARE), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds.

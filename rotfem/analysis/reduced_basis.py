@@ -333,7 +333,9 @@ class Between:
     def __init__(self, both: tuple[Spinning, Spinning], nodes: Sequence[Spinning], square: bool = True):
         pencil, self._square = both[0].pencil, square
         self._scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
-        vectors = np.hstack([v for s in both for v in (s.pairs.right, s.pairs.left)]) / self._scale
+        # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
+        further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in both]
+        vectors = np.hstack([*(s.pairs.right for s in both), *further]) / self._scale
         self._comm, self._V = pencil.comm, spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
         self._speeds = np.array([s.speed for s in nodes])
         X = self._scale * self._V
