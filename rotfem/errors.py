@@ -53,11 +53,7 @@ class InputError(ValueError):
 
 @contextmanager
 def input_of(file: str) -> Iterator[None]:
-    """Say of which scene file, by its name, an `InputError` is.
-
-    Raises:
-        SceneError: in the place of an `InputError` that names no file.
-    """
+    """Say of which scene file, by its name, an `InputError` is."""
     try:
         yield
     except SceneError:

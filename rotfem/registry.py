@@ -39,12 +39,7 @@ class Registry(Generic[E]):
         self._entries: dict[str, E] = {}
 
     def add(self, entry: E) -> None:
-        """Add an entry.
-
-        Raises:
-            TypeError: it is a class that lacks a method or an attribute, or whose parameters are no dataclass fields.
-            ValueError: its name is taken, or no name.
-        """
+        """Add an entry."""
         self._load()
         _check_class(entry)
         if not isinstance(entry.name, str) or not entry.name.isidentifier():

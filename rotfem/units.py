@@ -26,15 +26,7 @@ def is_quantity(text: str) -> bool:
 
 
 def quantity(text: str, unit: str) -> float:
-    """Return the number of a text such as "12.1 rpm", in a unit.
-
-    Args:
-        text: a number with a unit.
-        unit: the unit that is wanted, in the words of pint; "" for that of SI, whatever is given.
-
-    Raises:
-        ValueError: says why it is none.
-    """
+    """Return the number of a text such as "12.1 rpm", in a unit."""
     found = _QUANTITY.fullmatch(text)
     if found is None:
         raise ValueError(f"must be a number ({shown(unit)}), or one with a unit in quotes")
@@ -48,16 +40,7 @@ def unit_of(text: str) -> str:
 
 
 def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
-    """Return a number in a unit, of a number or a text such as "12.1 rpm".
-
-    Args:
-        value: what was given.
-        unit: the unit, or several, of which the first of its kind is taken.
-        key: of what it is, for errors.
-
-    Raises:
-        InputError: it is no such text.
-    """
+    """Return a number in a unit, of a number or a text such as "12.1 rpm"."""
     if not isinstance(value, str):
         return value
     units, why = [unit] if isinstance(unit, str) else unit, ""
@@ -70,15 +53,7 @@ def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
 
 
 def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
-    """Return the numbers of a text without the unit that ends it, and how many of the wanted unit that is; 1 of none.
-
-    Args:
-        text: numbers with signs between them that are no letters, such as "0:15:31rpm".
-        unit: the unit that is wanted.
-
-    Raises:
-        ValueError: says why it is no such text.
-    """
+    """Return the numbers of a text without the unit that ends it, and that unit in the wanted one; 1 without."""
     found = re.fullmatch(r"\s*([-+0-9.eE:,\s]*[\d.])\s*([^\W\d].*)?", text)
     if found is None:
         raise ValueError("must be numbers, with a unit at the end of them all or without")
@@ -86,16 +61,7 @@ def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
 
 
 def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") -> float:
-    """Return seconds from a number, or text such as "60s", "2min", "1h".
-
-    Args:
-        text: what was given.
-        file: name for error messages.
-        key: what it was given for.
-
-    Raises:
-        SceneError: it is neither, or not greater than 0.
-    """
+    """Return seconds from a number, or text such as "60s", "2min", "1h"."""
     with suppress(ValueError):
         number, unit = split_unit(str(text), "s")
         if 0.0 < (value := float(number) * unit) < 1e9:
@@ -127,11 +93,7 @@ def _registry() -> Any:
 
 @lru_cache(maxsize=256)
 def _factor(name: str, unit: str) -> float:
-    """Return how many of a unit another one is.
-
-    Raises:
-        ValueError: it is not known, or of another kind.
-    """
+    """Return how many of a unit another one is."""
     import pint
 
     registry = _registry()

@@ -17,11 +17,7 @@ Array = npt.NDArray[np.float64]
 
 @contextmanager
 def called(key: str, what: str) -> Iterator[None]:
-    """Let what a user's function raises be an error of a key.
-
-    Raises:
-        InputError: from the error, in its place.
-    """
+    """Let what a user's function raises be an error of a key."""
     try:
         yield
     except InputError:
@@ -40,16 +36,6 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
     """Return a user's function that returns an array (size,), and refuses to return anything else.
 
     Two components get a third one, zero, where there are three.
-
-    Args:
-        function: of place, time or both.
-        key: key of the scene, for errors.
-        size: number of components.
-        of: what it is a function of, in words.
-        planar: whether the third of three components must be zero.
-
-    Returns:
-        The function; it raises an InputError that says at what arguments the other one failed, and how.
     """
     needed = "a number" if size == 1 else f"{size} numbers"
 

@@ -107,12 +107,7 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
 
 
 def repeated(values: Array, bounds: Array) -> list[list[int]]:
-    """Return the indices of eigenvalues (sorted by size) in groups of those that are one.
-
-    Args:
-        values: the eigenvalues, 1/s.
-        bounds: their relative error bounds; what is no farther apart than these, or EQUAL_EIGENVALUES, is one.
-    """
+    """Return the indices of eigenvalues (sorted by size) in groups of those that are one."""
     sizes = np.abs(values)
     off = bounds * sizes
     one = np.abs(values[1:] - values[:-1]) <= np.maximum(EQUAL_EIGENVALUES * sizes[1:], off[1:] + off[:-1])
@@ -317,7 +312,8 @@ class Sweep:
         """Return the modes at a speed, its equilibrium continued from start."""
         known = self.known.pop(speed, None)
         self.solves += known is None
-        return SpeedPoint(known or self.analysis.at(speed, self.count + SPARE, start), requested)
+        found = known or self.analysis.at(speed, self.count + SPARE, start)
+        return SpeedPoint(found.first(self.count + SPARE), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds.
@@ -475,13 +471,6 @@ class Sweep:
 
         At the speed that the model has, the modes are solved; with them the model is exact there. From one such
         solution to the next the error is squared, in parts of the distance of the points.
-
-        Args:
-            path: between two points.
-            f: point ↦ number.
-            speed: where the model has the zero.
-            sign: of f before it.
-            met: whether f is zero at a point but for the error bound of the modes there; None of an f that jumps.
         """
         if self.is_exact or self.only:
             return speed

@@ -62,13 +62,7 @@ class Farthest:
 
 
 def conditioning(system: Any, q: Array, time: float = np.inf) -> float:
-    """Return a bound of the relative error that round-off of K makes in a state of a linear theory; 0 of others.
-
-    Args:
-        system: equations of motion of the structure, hub held, with the time of the state set.
-        q: the state, a local dof array.
-        time: since the motion began (s), in which masses keep the error small; infinite of an equilibrium.
-    """
+    """Return a bound of the relative error that round-off of K makes in a state of a linear theory; 0 of others."""
     if not system.linear:
         return 0.0
     system.set_state(q)

@@ -65,15 +65,7 @@ class RowTimes:
 
 
 def between(old: State, new: State, times: list[float], order: int, comm: MPI.Comm) -> list[State]:
-    """Return the states at times (s) within a step; work and impulse of a free hub are linear in it.
-
-    Args:
-        old: state that the step starts from.
-        new: state that it ends in.
-        times: between them, s.
-        order: of the scheme that made it.
-        comm: MPI communicator of the processes that share the unknowns, all of which take the same polynomials.
-    """
+    """Return the states at times (s) within a step; work and impulse of a free hub are linear in it."""
     if not times:
         return []
     h, curve = new.t - old.t, polynomial(old, new, order, comm)
@@ -89,14 +81,7 @@ def between(old: State, new: State, times: list[float], order: int, comm: MPI.Co
 
 
 def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
-    """Return the coefficients of q in a step, by powers of (t − t_old)/h, (powers, unknowns).
-
-    Args:
-        old: state that the step starts from.
-        new: state that it ends in.
-        order: of the scheme that made it.
-        comm: see `between`.
-    """
+    """Return the coefficients of q in a step, by powers of (t − t_old)/h, (powers, unknowns)."""
     h = new.t - old.t
     data = np.array((old.q, old.v, old.a, new.q, new.v, new.a)) * np.array([1.0, h, h * h] * 2)[:, None]
     cubic, bent = _coefficients(2)

@@ -37,17 +37,7 @@ class FirstMotion:
     velocity: Sequence[Sequence[float]] | None = None
 
     def about(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
-        """Return (q, q̇) at t = 0, local dof arrays, about the state that the history starts from.
-
-        Args:
-            q: that state; None where it is undeformed.
-            analysis: of modes about it, by the equations of the history.
-            newton: iteration control.
-
-        Raises:
-            InputError: there is no such mode, or it does not move the tip.
-            ComputationError: no equilibrium, eigenpairs not to be trusted, or no motion of this amplitude.
-        """
+        """Return (q, q̇) at t = 0, local dof arrays, about the state that the history starts from."""
         system = analysis.system.held
         if self.velocity is not None:
             return q, of_velocities(system, self.velocity)
@@ -66,10 +56,6 @@ class FirstMotion:
 
         The tip moves by one in the direction in which it moves most; then the rates are Re(λᵏ a x e^{iφ}), and the
         patterns are M Re x and M Im x, owned unknowns (k, m), if they have 1 % of the kinetic energy.
-
-        Raises:
-            InputError: there is no such mode, or it does not move the tip.
-            ComputationError: no equilibrium, or eigenpairs not to be trusted.
         """
         number, system = self.mode or 1, analysis.system.held
         analysis.check_count(number, "initial.mode")
@@ -101,16 +87,6 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
         F(q, q̇₁, q̈₁) + Σ μ_i b_i = F(q₀, 0, 0),    b_i·(q − q₀ − q₁) = 0.
 
     q̇ follows by differentiation. To first order q₁ and q̇₁ solve both, with μ = 0.
-
-    Args:
-        system: equations of motion, the hub held.
-        state: q₀, with rotations as the system counts them.
-        signal: q₁ and its rates, (4, n).
-        patterns: b, owned unknowns (k, m).
-        newton: iteration control.
-
-    Raises:
-        ComputationError: it was not found.
     """
     shape, rate, acceleration, jerk = signal
     n, motion = patterns.shape[1], system.motion.at_speed(system.motion.speed(0.0))

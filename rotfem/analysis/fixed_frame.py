@@ -34,11 +34,7 @@ def has_anisotropic_supports(problem: Any) -> bool:
 
 
 def check_rotating(problem: Any, what: str) -> None:
-    """Refuse what is computed in the rotating frame, where coefficients would change with time.
-
-    Raises:
-        InputError: a support differs by direction.
-    """
+    """Refuse what is computed in the rotating frame, where coefficients would change with time."""
     if has_anisotropic_supports(problem):
         why = (
             "differ by direction, so that coefficients change with time in the rotating frame, in which "
@@ -81,11 +77,7 @@ class FixedFrame:
         return PETSc.Mat().createBAIJ((size, size), blocks.shape[1], csr=csr, comm=self.V.mesh.comm).convert("aij")
 
     def __call__(self, matrices: tuple[Any, Any, Any], speed: float) -> tuple[Any, Any, Any]:
-        """Return M, C and K in the fixed frame of those in the rotating one, at a speed (rad/s).
-
-        Raises:
-            InputError: the shaft is not the same in all directions, or has a damping that is given by mode.
-        """
+        """Return M, C and K in the fixed frame of those in the rotating one, at a speed (rad/s)."""
         M, C, K = matrices
         if sparse_part(C) is not C:
             raise InputError(

@@ -70,11 +70,7 @@ class FrequencyResponse:
         self._solver = ComplexSolver((pencil.K, pencil.C, pencil.M))
 
     def direct(self, omega: float) -> Array:
-        """Return the complex amplitudes of the outputs at a frequency (rad/s).
-
-        Raises:
-            ComputationError: there is no answer, at the frequency of a mode that has no damping.
-        """
+        """Return the complex amplitudes of the outputs at a frequency (rad/s)."""
         self._solver.factor((1.0, 1j * omega, -(omega**2)))
         x = self._solver.solve(self.force)
         read = np.concatenate([output.read(x, 1j * omega) for output in self._outputs])
@@ -98,22 +94,13 @@ class FrequencyResponse:
 
 
 def tip_output(system: Any) -> HarmonicOutput:
-    """Return the unknowns at the tip.
-
-    Args:
-        system: equations of motion of the structure, the hub held.
-    """
+    """Return the unknowns at the tip."""
     values = system.structure.tip_values
     return HarmonicOutput(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
 
 
 def root_output(system: Any, push: Array) -> HarmonicOutput:
-    """Return force and moment of the hub on the structure; what is at the state in the system is the equilibrium.
-
-    Args:
-        system: equations of motion of the structure, the hub held.
-        push: part of this process in what the harmonic loads add to the forces of the clamp, (motions,).
-    """
+    """Return force and moment of the hub on the structure; what is at the state in the system is the equilibrium."""
     K, C, M = system.clamp_tangents()
 
     def read(x: Array, s: complex) -> Array:
@@ -126,11 +113,7 @@ def root_output(system: Any, push: Array) -> HarmonicOutput:
 
 
 def hub_output(system: Any) -> HarmonicOutput:
-    """Return the angle (rad) of a free hub, the last unknown on the last process.
-
-    Args:
-        system: equations of motion of hub and structure.
-    """
+    """Return the angle (rad) of a free hub, the last unknown on the last process."""
     last = system.comm.size - 1
 
     def read(x: Array, s: complex) -> Array:
@@ -141,13 +124,7 @@ def hub_output(system: Any) -> HarmonicOutput:
 
 
 def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
-    """Return the same as `root_output` where the hub is free, in balance with its equation.
-
-    Args:
-        system: equations of motion of hub and structure (see `BorderedSystem.root_reaction`).
-        push: see `root_output`.
-        speed: of the equilibrium, rad/s.
-    """
+    """Return the same as `root_output` where the hub is free, in balance with its equation."""
     plain, angle, hub, held = root_output(system.held, push), hub_output(system), system.hub, system.held
 
     def forces(speed: float, rate: float) -> Array:
@@ -175,13 +152,7 @@ def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
 
 
 def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, ...]) -> HarmonicOutput:
-    """Return section forces, strains and unknowns at stations of a beam; the equilibrium is written into the system.
-
-    Args:
-        system: equations of motion of the beam, the hub held.
-        positions: of the stations, m.
-        names: of the quantities that are wanted.
-    """
+    """Return section forces, strains and unknowns at stations of a beam; the equilibrium is written into the system."""
     changes, owned = StationChanges(system, positions), len(system.root.weights)
     columns = [changes.names.index(name) for name in names]
 

@@ -84,11 +84,7 @@ class LoadFactors:
     start: Raised | None = None
 
     def speed(self, share: float) -> float:
-        """Return the speed (rad/s) at a share.
-
-        Raises:
-            ComputationError: it would be imaginary.
-        """
+        """Return the speed (rad/s) at a share."""
         part = self.spin[0] + share * (self.spin[1] - self.spin[0])
         if part < 0.0 and self.omega != 0.0:
             raise ComputationError("the square of the speed would have to be negative")
@@ -119,9 +115,6 @@ def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     Newton's method was beyond its tangent, where the step turns back on the one before, or where the stiffness gets a
     negative eigenvalue (Sylvester): then it has passed a critical point, or left the path. What remains of that at the
     smallest step is a bifurcation of the path itself, beyond which it is unstable and no further ones are looked for.
-
-    Raises:
-        ComputationError: none was found; says how far the load got.
     """
     q, done, share, least = growth.begin(system), 0.0, 1.0, 1.0
     reference, critical, before = system.reference, None, None
@@ -178,14 +171,6 @@ def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
 
     At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes, and of loads where
     nothing spins. So springs hold the root first, and let it go; the loads grow at the full speed.
-
-    Args:
-        system: equations of motion of a nonlinear theory, the hub held.
-        omega: speed, rad/s.
-        newton: iteration control.
-
-    Returns:
-        Speed and loads growing together, as of other structures, where that equilibrium is not found.
     """
     springs = [spring.stiffness for spring in system.structure.springs()]
     given = [float(constant.value) for constant in springs]
@@ -216,12 +201,7 @@ def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
 
 
 def counted(system: System, growth: LoadFactors, share: float, q: Array, newton: Newton) -> Array:
-    """Return a balanced state, where its rotations are large counted from a shape near it and balanced again.
-
-    Raises:
-        BeyondReach: they have changed too much since the last equilibrium.
-        ComputationError: the state could not be balanced again.
-    """
+    """Return a balanced state, where its rotations are large counted from a shape near it and balanced again."""
     system.check_reach(q)
     turns = system.structure.turns
     if turns is None or not turns.is_due(q):
@@ -232,16 +212,7 @@ def counted(system: System, growth: LoadFactors, share: float, q: Array, newton:
 def balance(
     system: System, growth: LoadFactors, share: float, guess: Array, newton: Newton, *, checked: bool = True
 ) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads.
-
-    Args:
-        system: equations of motion, the hub held.
-        growth: what grows with the share.
-        share: of it.
-        guess: where to start, a local dof array.
-        newton: iteration control.
-        checked: whether a state that is turned inside out is refused.
-    """
+    """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads."""
     growth.set(system, share)
     q = guess.copy()
 
@@ -264,14 +235,7 @@ def balance(
 def limited(
     system: System, x: Array, correction: Callable[[Array | None], Array], soon: int = 4
 ) -> Callable[[bool], tuple[float, bool]]:
-    """Return an iteration of Newton's method, which corrects x by no more than REACH and returns the size.
-
-    Args:
-        system: equations of motion; the state is set before each correction and after it.
-        x: the unknowns, a local dof array, with further ones behind; overwritten.
-        correction: q from which the last one has led here (see `System.tangent`), or None ↦ change of x.
-        soon: iterations after which that q is given, as it pays the compilation of a tangent then.
-    """
+    """Return an iteration of Newton's method, which corrects x by no more than REACH and returns the size."""
     n = len(system.q.x.array)
     before, followed = x[:n].copy(), 0
 
@@ -288,10 +252,6 @@ def limited(
 
 
 def check_inside_out(system: System) -> None:
-    """Refuse a state that is set in a system and turned inside out.
-
-    Raises:
-        ComputationError: it is.
-    """
+    """Refuse a state that is set in a system and turned inside out."""
     if not system.linear and system.model.inside_out():
         raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")

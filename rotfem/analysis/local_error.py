@@ -44,12 +44,7 @@ class LocalError:
         self._solvers: list[DirectSolver] = []
 
     def __call__(self, error: Array | None, h: float) -> float:
-        """Return the largest displacement of an error of q (local dof array), scaled, at the end of the history.
-
-        Args:
-            error: local error of q; of a free hub with that of its angle last.
-            h: length of the step, s.
-        """
+        """Return the largest displacement of an error of q (local dof array), scaled, at the end of the history."""
         assert error is not None
         M, bucket = self._matrices[0], round(np.log(h) / np.log(COARSE))
         if bucket != self._bucket:

@@ -102,11 +102,6 @@ class Resultants:
 
         With it the geometric stiffness of x per unit strain of the state, whose own round-off is one of numbers of
         order one; None of a state without stress.
-
-        Args:
-            M: mass matrix.
-            C: gyroscopic and damping matrix.
-            unit: size of the frequencies, 1/s.
         """
         system = self.system
         self._state.x.array[:] = system.q.x.array
@@ -177,13 +172,7 @@ class KeptDigits:
         return Resultants(self.system)
 
     def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
-        """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them.
-
-        Args:
-            pencil: M, C and K at the state that is set; where C is not sparse nothing better is tried.
-            pairs: its eigenpairs.
-            count: number of pairs wanted.
-        """
+        """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them."""
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
         if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
             return pairs
@@ -224,12 +213,6 @@ def scale(pencil: Pencil, rest: Any, factors: Any, unit: float) -> None:
 
     Those of x are scaled by what soft strains, or where there are none the inertia at a frequency of the size wanted,
     make of them; the equation of each strain by its largest entry.
-
-    Args:
-        pencil: the matrices.
-        rest: K_rest.
-        factors: K without K_rest: each entry is one product, rounded relative to itself. It is overwritten.
-        unit: size of the frequencies, 1/s.
     """
     indptr, indices, data = factors.getValuesCSR()
     factors.setValuesCSR(indptr, indices, np.abs(data))

@@ -42,14 +42,6 @@ def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> Re
     """Return the analysis in a basis where that is possible and saves time, else None.
 
     It is possible of a linear theory in the rotating frame with a fixed hub.
-
-    Args:
-        analysis: compiled problem.
-        speeds: increasing speeds, rad/s.
-        count: number of modes at each.
-
-    Raises:
-        ComputationError: a full solution failed.
     """
     if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
         return None
@@ -195,9 +187,6 @@ class ReducedAnalysis(ModalAnalysis):
         """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
 
         It grows until frequencies halfway between known speeds are those of the full system to 1e-6.
-
-        Raises:
-            ComputationError: a full solution failed.
         """
         for speed in (first, last):
             self._add(self._solve(speed, count))
@@ -303,11 +292,6 @@ class ReducedAnalysis(ModalAnalysis):
         """Return the normwise backward errors of lifted eigenpairs in the full system, shape (m,).
 
         Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
-
-        Args:
-            values: λ, shape (m,).
-            right: vectors, a column each.
-            c: factors of the pieces of M, C and K, shape (pieces, m).
         """
         power = np.repeat([2, 1, 0], [len(self.basis.kinds[kind]) for kind in "MCK"])
         factors = c * values ** power[:, None]
@@ -333,7 +317,9 @@ class Between:
     def __init__(self, both: tuple[Spinning, Spinning], nodes: Sequence[Spinning], square: bool = True):
         pencil, self._square = both[0].pencil, square
         self._scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
-        vectors = np.hstack([v for s in both for v in (s.pairs.right, s.pairs.left)]) / self._scale
+        # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
+        further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in both]
+        vectors = np.hstack([*(s.pairs.right for s in both), *further]) / self._scale
         self._comm, self._V = pencil.comm, spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
         self._speeds = np.array([s.speed for s in nodes])
         X = self._scale * self._V

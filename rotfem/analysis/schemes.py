@@ -151,11 +151,7 @@ class Equations(Protocol):
         """Return the predicted q of a stage; where the clamp moves the last shape, turned with it."""
 
     def solve(self, stage: Stage, state: State) -> None:
-        """Solve one stage of a step from a state.
-
-        Raises:
-            ComputationError: it cannot be solved.
-        """
+        """Solve one stage of a step from a state."""
 
     def imbalance(self, stage: Stage) -> Array:
         """Return −F at a stage, zero at clamped unknowns; the owned part, of a free hub with that of its angle last."""

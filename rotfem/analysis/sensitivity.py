@@ -89,10 +89,6 @@ def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str,
 
     Rows hold `mode` (from 1), `parameter`, `value`, `dfrequency` (rad/s per unit), `dgrowth` (1/s per unit) and
     `relative`.
-
-    Raises:
-        ComputationError: no equilibrium for a parameter that is a little different.
-        InputError: the hub is free, or damping is by mode.
     """
     analysis.needs_fixed_hub("sensitivities")
     if analysis.system.by_mode is not None:

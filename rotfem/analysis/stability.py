@@ -115,12 +115,7 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
 
 
 def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
-    """Return the stability of the equilibrium that M, C and K are about.
-
-    Args:
-        pencil: with the unknown of a free hub, if there is one.
-        clamped: without it.
-    """
+    """Return the stability of the equilibrium that M, C and K are about."""
     negative = None if clamped.factor is None else clamped.factor.negative
     negative = negative_count(clamped.K) if negative is None else negative
     if negative == 0:
@@ -132,13 +127,7 @@ def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
 
 
 def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
-    """Return the stability that the eigenvalues of M, C and K decide.
-
-    Args:
-        pencil: M, C, K.
-        negative: number of negative eigenvalues of a symmetric K; None where it says nothing.
-        target: shift, away from the zero eigenvalue of a free hub (1/s).
-    """
+    """Return the stability that the eigenvalues of M, C and K decide."""
     count = 8 if negative is None else max(8, 2 * negative + 2)
     gyroscopic = negative is not None and not symmetric(pencil.C)  # forces that may stabilise it
     if negative and negative_count(pencil.K, sure=True) == 0:
@@ -173,13 +162,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
 
 
 def _counted(pencil: Pencil, pairs: Eigenpairs, gyroscopic: bool) -> tuple[int, int]:
-    """Return (k_r + 2 k_c, 2 k_i): for how many negative eigenvalues of K eigenpairs have been found that come of them.
-
-    Args:
-        pencil: M, C, K.
-        pairs: what was found.
-        gyroscopic: whether there are gyroscopic forces, which may stabilise it.
-    """
+    """Return (k_r + 2 k_c, 2 k_i): the negative eigenvalues of K that the eigenpairs found account for."""
     values = pairs.values
     real = values.imag <= EQUAL_EIGENVALUES * np.abs(values)
     grows = values.real > GROWTH * np.abs(values)
@@ -219,10 +202,6 @@ def constant_stability(system: Any, newton: Newton) -> Stability | None:
     """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
 
     A symmetric structure under symmetric loads never leaves an unstable equilibrium by itself: its history looks calm.
-
-    Args:
-        system: equations of motion; state and time are left at the equilibrium where it has all unknowns.
-        newton: iteration control.
     """
     problem = system.model.problem
     if not are_constant(problem):
@@ -247,9 +226,6 @@ def critical_speed(system: Any) -> float | None:
 
     Of a nonlinear theory there is none: its stiffness is that of each equilibrium. One beyond a thousand
     times the speed at which spin doubles a stiffness counts as none where it is not found at once.
-
-    Raises:
-        ComputationError: the eigensolver did not converge.
 
     K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
     """

@@ -53,11 +53,7 @@ class StateSpace:
         return self.A, self.B, self.C, self.D
 
     def write(self, path: Path) -> Path:
-        """Write all of it as an .npz file.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write all of it as an .npz file."""
         arrays: dict[str, Any] = {name: np.array(value) for name, value in vars(self).items()}
         with writing(path):
             np.savez(path, **arrays)
@@ -65,17 +61,7 @@ class StateSpace:
 
 
 def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> StateSpace:
-    """Return the model of the first `count` modes (and the static answer of all others).
-
-    Args:
-        analysis: compiled scene.
-        spinning: equilibrium and eigenpairs at one speed.
-        count: modes kept; a conjugate pair is one mode of two states.
-
-    Raises:
-        SceneError: the analysis is distributed over several processes.
-        ComputationError: a motion has no stiffness.
-    """
+    """Return the model of the first `count` modes (and the static answer of all others)."""
     serial(analysis, "the state-space model")
     structure = analysis.structure
     if np.any(spinning.pairs.bounds[:count] >= 1.0):
@@ -104,13 +90,7 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
 
 
 def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) -> list[Path]:
-    """Write M, C and K without the clamped unknowns as Matrix Market and npz, and what each unknown is; return paths.
-
-    Raises:
-        OutputError: the folder cannot be written.
-        SceneError: the analysis is distributed over several processes.
-        InputError: C is full and too large to be written.
-    """
+    """Write M, C, K of the free unknowns as Matrix Market and npz, and what each unknown is; return paths."""
     serial(analysis, "the export of matrices")
     structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
@@ -140,11 +120,7 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
 
 
 def serial(analysis: ModalAnalysis, what: str) -> None:
-    """Refuse to gather a distributed system, and a free hub, whose angle is no unknown of the mesh.
-
-    Raises:
-        SceneError: there is more than one process, or the hub is free.
-    """
+    """Refuse to gather a distributed system, and a free hub, whose angle is no unknown of the mesh."""
     analysis.needs_fixed_hub(what)
     if analysis.comm.size > 1:
         raise SceneError("command line", "mpirun -n", analysis.comm.size, f"{what} needs one process")

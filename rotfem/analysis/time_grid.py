@@ -117,9 +117,6 @@ def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
 
     By bisection: a large change over a step is followed into the half with more of it, down to neighbouring numbers. It
     is a jump if it does not become smaller.
-
-    Raises:
-        InputError: it jumps and must not.
     """
     if signal.known:
         return

@@ -20,15 +20,7 @@ def advise(
     critical: float | None = None,
     also: Sequence[str] = (),
 ) -> list[str]:
-    """Return hints, one line each, and hand them on.
-
-    Args:
-        scene: validated scene.
-        hint: called with every line; None asks for no advice.
-        speed: the largest speed of the computation, rad/s; what the scene prescribes if None.
-        critical: the speed at which the stiffness of a linear theory is singular, rad/s; None if there is none.
-        also: further hints, which the scene alone does not give.
-    """
+    """Return hints, one line each, and hand them on."""
     if hint is None:
         return []
     end = None if scene.time is None else scene.time.end

@@ -28,11 +28,7 @@ class Missed(ComputationError):
 
 
 def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
-    """Refuse an accuracy of something else than what a command computes, by its verb.
-
-    Raises:
-        InputError: the scene asks for another.
-    """
+    """Refuse an accuracy of something else than what a command computes, by its verb."""
     if scene.accuracy_of not in (None, *wanted):
         able = " or ".join(f'"{name}"' for name in wanted)
         reason = f'is not what "{command}" computes; it must be {able}, or not given'
@@ -45,14 +41,7 @@ def clock_of(scene: Scene, comm: MPI.Comm, announce: Hint | None = None) -> Cloc
 
 
 def error_of(answers: Answers, own: Answer, comm: MPI.Comm, parts: bool = False) -> Errors | None:
-    """Return the error of an answer; None where Ctrl-C has ended its computation.
-
-    Args:
-        answers: of the scene.
-        own: the answer.
-        comm: of the processes.
-        parts: whether errors of steps and mesh are wanted one by one.
-    """
+    """Return the error of an answer; None where Ctrl-C has ended its computation."""
     try:
         return estimate(answers, own, parts)
     except KeyboardInterrupt as stop:
@@ -62,16 +51,7 @@ def error_of(answers: Answers, own: Answer, comm: MPI.Comm, parts: bool = False)
 
 
 def with_error(result: R, errors: Errors | None, own: Answer, scene: Scene, started: float, **more: Any) -> R:
-    """Return a result with `error`, `settings` and the warnings of it in its summary.
-
-    Args:
-        result: without.
-        errors: its error; None if that was interrupted.
-        own: the answer that it is of.
-        scene: of that.
-        started: `perf_counter()` when the error was begun.
-        more: further entries of the summary.
-    """
+    """Return a result with `error`, `settings` and the warnings of it in its summary."""
     said = ["its error was not estimated: interrupted"] if errors is None else warnings_of(errors, own.setting, scene)
     found = {} if errors is None else {"error": errors.summary(), "settings": errors.rows}
     timings = {**result.summary["timings"], "error": perf_counter() - started}
@@ -79,21 +59,7 @@ def with_error(result: R, errors: Errors | None, own: Answer, scene: Scene, star
 
 
 def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish: Callable[[Any, Errors], R]) -> R:
-    """Return the first result down the ladder whose error is within the accuracy of a scene.
-
-    Args:
-        answers: of the scene.
-        of: what the error is of.
-        clock: of all answers.
-        comm: of the processes.
-        finish: result, errors ↦ the result with what its verb adds.
-
-    Raises:
-        Missed: none was found; its attribute `result` holds the best that was reached.
-        ComputationError: nothing was reached.
-        Stopped: its attribute `result` holds the best that was reached.
-        KeyboardInterrupt: nothing was, or the ranks do not agree.
-    """
+    """Return the first result down the ladder whose error is within the accuracy of a scene."""
     scene, found, started = answers.scene, Walk(), perf_counter()
     assert scene.accuracy is not None
 

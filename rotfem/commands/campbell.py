@@ -49,14 +49,7 @@ PAIRS = ("values", "right", "left", "errors", "bounds")
 
 
 def parse_speeds(text: str) -> list[float]:
-    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
-
-    Args:
-        text: what was asked for.
-
-    Raises:
-        SceneError: the text is neither, or the speeds do not increase.
-    """
+    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end."""
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
@@ -145,22 +138,7 @@ def diagram(
     only: bool = False,
     kept: FinishedSpeeds | None = None,
 ) -> CampbellResult:
-    """Return the branches over speed, with what the diagram says.
-
-    Args:
-        scene: validated scene.
-        analysis: of its modes.
-        values: increasing speeds, rad/s.
-        started: `perf_counter()` at the start.
-        progress: see `campbell`.
-        hint: see `campbell`.
-        only: see `campbell`.
-        kept: speeds that are solved already.
-
-    Raises:
-        ComputationError: see `campbell`.
-        Stopped: see `campbell`.
-    """
+    """Return the branches over speed, with what the diagram says."""
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
     own, reduced = analysis, in_basis(analysis, values, count + SPARE)
@@ -295,11 +273,7 @@ class FinishedSpeeds:
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
-        """Keep the modes of some points, but for those whose rotations are counted from a deformed shape.
-
-        Raises:
-            OutputError: they cannot be written.
-        """
+        """Keep the modes of some points, but for those whose rotations are counted from a deformed shape."""
         done = [point.spinning for point in points if point.spinning.reference is None]
         if MPI.COMM_WORLD.rank > 0 or not done:
             return
@@ -333,14 +307,7 @@ def solved_by_all(
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:
-    """Return warnings of branches that were lost or are unsure, and of instabilities.
-
-    Args:
-        sweep: the branches.
-        labels: their names.
-        onsets: ranges of instability.
-        ends: rows of the modes at the last speed.
-    """
+    """Return warnings of branches that were lost or are unsure, and of instabilities."""
     last = sweep.points[-1]
     lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
     out = []
@@ -392,14 +359,7 @@ def branch_errors(scene: Scene, analysis: ModalAnalysis, solved: ModalAnalysis, 
 def point_rows(
     analysis: ModalAnalysis, point: SpeedPoint, labels: list[str], mesh: Sequence[float | None] | None
 ) -> list[dict[str, Any]]:
-    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch.
-
-    Args:
-        analysis: of the modes.
-        point: at the speed.
-        labels: names of the branches.
-        mesh: their relative errors by the mesh; None where they are not wanted.
-    """
+    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
     columns, rows = mode_rows(analysis, point.spinning.first(1 + max(point.order[: len(labels)]))), []
     own, of_rotors = "frequency frequency_hz damping growth residual error_bound", "turning whirl frequency_fixed"
     for b, label in enumerate(labels):

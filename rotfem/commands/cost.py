@@ -164,11 +164,7 @@ def without_accuracy(scene: Scene) -> Scene:
 
 
 def checked(scene: Scene, accuracy: float, output: str | None) -> str:
-    """Return the output that is compared.
-
-    Raises:
-        SceneError: what is asked for is not valid, or has no meaning for the scene.
-    """
+    """Return the output that is compared."""
     if not 0 < accuracy < inf:
         raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
     if output is None:  # what the scene computes
@@ -208,11 +204,7 @@ def schemes_of(scene: Scene, quick: bool) -> list[str]:
 
 
 def chosen(scene: Scene, option: str, given: Sequence[str] | None, default: list[str]) -> list[str]:
-    """Return names that were given, or the default ones.
-
-    Raises:
-        SceneError: one is not allowed, or has no meaning for this scene.
-    """
+    """Return names that were given, or the default ones."""
     key = {"theories": "model.theory", "schemes": "time.scheme"}[option]
     if given and option == "schemes" and scene.time is None:
         raise SceneError(scene.file, "time", None, "missing; schemes have a meaning only with [time]")

@@ -88,11 +88,7 @@ def explain(
 
 
 def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:
-    """Return the effects of a history or steady state that its accuracy calls for; all of them where nothing is known.
-
-    Raises:
-        InputError: the scene cannot be computed.
-    """
+    """Return the effects of a history or steady state that its accuracy calls for; all where nothing is known."""
     assert scene.accuracy is not None
     of = Explanation(scene, terms, comm, modes=False)
     of.compute(lambda share: None, ("effect",))
@@ -316,11 +312,7 @@ class Explanation:
 
 
 def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
-    """Return what a computation gives with the plain tangent; if that fails, with the one that takes longer to compile.
-
-    Raises:
-        ComputationError: it fails with both.
-    """
+    """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
     held = system.held
     if held.linear:
         return compute()
@@ -335,11 +327,7 @@ def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
 
 
 def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
-    """Return the tip over time of a system, at all steps.
-
-    Raises:
-        ComputationError: it fails, or a linear theory diverges.
-    """
+    """Return the tip over time of a system, at all steps."""
     time = scene.time
     assert time is not None
     start = with_plain_tangents(system, lambda: first_state(scene, problem, system, judged=False))
@@ -355,12 +343,7 @@ def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
 
 
 def why(change: Change, own: Theory) -> str:
-    """Return in a few words why an effect or theory is in a model or not, and whether it has to be.
-
-    Args:
-        change: it makes.
-        own: theory of the model.
-    """
+    """Return in a few words why an effect or theory is in a model or not, and whether it has to be."""
     if change.refused:
         return change.refused
     failed = "".join(f"; {name}: {text}" for name, text in change.notes.items())
@@ -392,11 +375,7 @@ MEANING = {
 
 
 def groups(of: Explanation) -> dict[str, float]:
-    """Return name ↦ number, those that a case has; `MEANING` says what they are.
-
-    Args:
-        of: its changes, which were computed.
-    """
+    """Return name ↦ number, those that a case has; `MEANING` says what they are."""
     system, time, problem = of.system, of.scene.time, of.problem
     structure, tips = problem.structure, of.pairs.get(HISTORY) or of.pairs.get(STEADY)
     values = np.empty(0) if MODES not in of.pairs else of.pairs[MODES].own[1].output.values

@@ -219,9 +219,6 @@ def write_xdmf(
 
     Points (n, 3) are in m; cells, lines or triangles, have the numbers of theirs, (m, 2 or 3); frames are times (s)
     with values (n,) or (n, 3) by name, the same names at all times.
-
-    Raises:
-        OutputError: one cannot be written.
     """
     heavy, per_cell = path.with_suffix(".h5"), cells.shape[1]
     root = ET.Element("Xdmf", Version="3.0")

@@ -42,17 +42,7 @@ class Start:
 
 
 def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True) -> Start:
-    """Return what the history of a scene starts from.
-
-    Args:
-        scene: what is run.
-        problem: its problem, with the model and the mesh in use.
-        system: the equations of motion of that.
-        judged: whether stability is wanted; an answer to compare with starts without.
-
-    Raises:
-        ComputationError: there is no static shape, or no equilibrium, or an unstable one.
-    """
+    """Return what the history of a scene starts from."""
     initial, newton, start = scene.initial, Newton.of(scene.solver), Start()
     if initial.state == "steady":
         start = _equilibrium(scene, problem, system, judged)

@@ -48,12 +48,7 @@ def write_imported(scene: Scene, source: Path, path: Path) -> Path:
 
 
 def toml_text(tables: Mapping[str, Any], above: str = "") -> str:
-    """Return nested tables as TOML; tables of numbers have a row on each line.
-
-    Args:
-        tables: of texts, numbers and lists.
-        above: dotted name of the table that they are in.
-    """
+    """Return nested tables as TOML; tables of numbers have a row on each line."""
     lines = [f"\n[{above}]"] if above and any(not isinstance(value, Mapping) for value in tables.values()) else []
     for key, value in tables.items():
         if isinstance(value, Mapping):

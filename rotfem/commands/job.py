@@ -187,12 +187,7 @@ def job(
 def command(
     computes: bool = True, first: Callable[[Session, Path, Sequence[str]], bool] | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command of a function of a job and its own options.
-
-    Args:
-        computes: whether it computes the scene, with advice, to an accuracy, and does not compare ways to.
-        first: what it does before there is a job, (session, path, overrides) ↦ whether that was all.
-    """
+    """Make a command of a function of a job and its own options."""
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]

@@ -26,19 +26,7 @@ def mode_tables(
     formats: tuple[str, ...] | None = None,
     found: Spinning | None = None,
 ) -> ModesResult:
-    """Return the first modes at a speed, with warnings of the model and of instabilities.
-
-    Args:
-        analysis: compiled problem.
-        speed: rad/s.
-        count: number of modes, that of a rigid body among them.
-        keep: whether the matrices must outlast another solution.
-        formats: of the files for ParaView that are wanted; None of a structure that may have no surface.
-        found: the modes, where they are computed already.
-
-    Raises:
-        ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
-    """
+    """Return the first modes at a speed, with warnings of the model and of instabilities."""
     found = found or analysis.at(speed, count, keep=keep)
     rigid = int(found.rigid)
     spinning = found.first(count - rigid)
@@ -69,13 +57,7 @@ def mode_tables(
 def mode_rows(
     analysis: ModalAnalysis, spinning: Spinning, mesh: Sequence[float | None] | None = None
 ) -> list[dict[str, Any]]:
-    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors.
-
-    Args:
-        analysis: of the modes.
-        spinning: at the speed.
-        mesh: relative errors by the mesh; None where they are not wanted.
-    """
+    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     rows, pairs, described = [], spinning.pairs, analysis.described(spinning)
     names, waves = distinct(described.names), described.waves
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
@@ -116,13 +98,7 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def critical(rows: list[dict[str, Any]], speed: float, fixed: bool) -> list[str]:
-    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for 0.1 % of it.
-
-    Args:
-        rows: of the modes.
-        speed: rad/s.
-        fixed: whether frequencies are those in the fixed frame.
-    """
+    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for 0.1 % of it."""
     return [
         f"critical speed: {row['label']} has {speed_text(omega, 3)} in the rotor at {speed_text(abs(speed))}; an "
         "unbalance meets no stiffness there"

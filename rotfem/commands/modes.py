@@ -90,18 +90,7 @@ def speed_of(scene: Scene, problem: ProblemData) -> float:
 
 
 def led_to_accuracy(scene: Scene, analysis: ModalAnalysis, speed: float, compute: Callable[..., R]) -> R:
-    """Return what a command computes of the modes of a scene, with the setting whose modes are within its accuracy.
-
-    Args:
-        scene: with an accuracy.
-        analysis: of its own modes.
-        speed: of the modes that are led to the accuracy, rad/s.
-        compute: variant of the scene, errors of its modes, these modes ↦ result.
-
-    Raises:
-        Missed: there is none; its attribute `result` holds the best.
-        ComputationError: see `modes`.
-    """
+    """Return what a command computes of the modes of a scene, with the setting whose modes are within its accuracy."""
     check_of(scene, ("frequencies",), "modes and campbell")
     answers, comm = modal_answers(scene, analysis, speed, lambda found: found), analysis.everyone
 
@@ -119,18 +108,7 @@ def _mesh_of(analysis: ModalAnalysis) -> tuple[Any, int]:
 
 
 def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
-    """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one.
-
-    Args:
-        scene: as it was given.
-        compute: variant of the scene ↦ result.
-        comm: MPI communicator.
-        command: the verb.
-
-    Raises:
-        SceneError: the scene is not valid for the command.
-        ComputationError: see `modes`.
-    """
+    """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one."""
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
@@ -194,11 +172,7 @@ def _modes(
 
 
 def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm, counted: bool = True) -> ModalAnalysis:
-    """Return the modal analysis that a scene asks for, of a small system each process for itself.
-
-    Raises:
-        InputError: more modes are asked for than there are unknowns, or a mesh that cannot be computed with.
-    """
+    """Return the modal analysis that a scene asks for, of a small system each process for itself."""
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
     analysis.everyone = comm
     analysis.estimates = scene.output.error

@@ -120,15 +120,7 @@ def hub_values(system: Any, state: State) -> dict[str, float]:
 
 
 def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
-    """Return the shape that a motion starts from (local dof array), and set the reference rotation of the system.
-
-    Args:
-        system: equations of the motion.
-        start: a shape with rotations counted from the undeformed structure, or a moment of this system or another one.
-
-    Raises:
-        InputError: it is a shape of another mesh.
-    """
+    """Return the shape that a motion starts from (local dof array), and set the reference rotation of the system."""
     if start is None:
         return None
     held, reference = system.held, None

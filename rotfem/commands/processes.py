@@ -31,11 +31,7 @@ SHARED_FROM = 10_000
 
 
 def communicator(problem: Problem, comm: MPI.Comm) -> MPI.Comm:
-    """Return what a problem is discretised on: all processes where it is large, else each one by itself.
-
-    Raises:
-        InputError: the environment variable ROTFEM_SHARED_FROM, another bound than `SHARED_FROM`, is no number.
-    """
+    """Return what a problem is discretised on: all processes where it is large, else each one by itself."""
     given = os.environ.get("ROTFEM_SHARED_FROM", "")
     try:
         least = float(given or SHARED_FROM)
@@ -55,12 +51,7 @@ def unknowns(problem: Problem) -> float:
 
 
 def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.Comm) -> list[Found]:
-    """Return what some work makes of every item, on all ranks; each rank does neighbouring items in their order.
-
-    Raises:
-        ComputationError: one failed, on all ranks.
-        InputError: likewise.
-    """
+    """Return what some work makes of every item, on all ranks; each rank does neighbouring items in their order."""
     first, last = (len(items) * rank // comm.size for rank in (comm.rank, comm.rank + 1))
     done: list[Found] = []
     problem = None
@@ -84,13 +75,7 @@ def raise_first(problems: Iterable[Exception | None]) -> None:
 
 
 def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
-    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing".
-
-    Args:
-        command: the verb.
-        comm: all processes of the command.
-        inner: those that the system is discretised on.
-    """
+    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing"."""
     if comm.size == 1:
         return {"ranks": 1}
     copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")

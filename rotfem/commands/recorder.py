@@ -111,11 +111,7 @@ class Monitor:
 
 
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:
-    """See that all named values, computed at a time (s), are finite; what is no number passes.
-
-    Raises:
-        ComputationError: names those that are not, and where.
-    """
+    """See that all named values, computed at a time (s), are finite; what is no number passes."""
     wrong = [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
     if wrong:
         more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
@@ -156,11 +152,7 @@ class ResultantRows:
         self.largest: tuple[float, ...] = ()
 
     def __call__(self, t: float) -> float:
-        """Keep the values at the state that is written into the system; return the largest equivalent stress, Pa.
-
-        Raises:
-            ComputationError: a number is not finite.
-        """
+        """Keep the values at the state that is written into the system; return the largest equivalent stress, Pa."""
         values = self._resultants()
         worst = int(np.argmax(values[:, self._stress]))
         stress = float(values[worst, self._stress])
@@ -198,11 +190,7 @@ class StationRows:
         self.seen = 0
 
     def __call__(self, t: float) -> None:
-        """Keep the values at the state that is written into the system, or pass the row by.
-
-        Raises:
-            ComputationError: a number is not finite.
-        """
+        """Keep the values at the state that is written into the system, or pass the row by."""
         if self.seen % self.output.every == 0:
             values = self._stations()[:, self._columns]
             check_finite(zip(self.names, map(float, values.sum(axis=0)), strict=True), t, " at the stations")
@@ -250,19 +238,11 @@ class Recorder:
         self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:
-        """Add a row for a state.
-
-        Raises:
-            ComputationError: a number of it is not finite.
-        """
+        """Add a row for a state."""
         self.add(self.row(state), state)
 
     def row(self, state: State) -> list[float]:
-        """Return the row of a state; stations and plates keep what they have of it.
-
-        Raises:
-            ComputationError: a number of theirs is not finite.
-        """
+        """Return the row of a state; stations and plates keep what they have of it."""
         system, t = self.system, state.t
         system.held.show_time(t)
         write_state(system, state)
@@ -278,11 +258,7 @@ class Recorder:
         return row if self.resultants is None else [*row, self.resultants(t)]
 
     def add(self, row: Sequence[float], state: State) -> None:
-        """Add a row, and keep the state that it is of.
-
-        Raises:
-            ComputationError: a number of it is not finite.
-        """
+        """Add a row, and keep the state that it is of."""
         if not math.isfinite(sum(row)):
             check_finite(zip(self.history.columns, row, strict=True), row[0])
         self.history.append(row)

@@ -166,14 +166,6 @@ def resolved(
 
     Where the logarithm of an amplitude is off the line through its neighbours by more than BEND, the intervals on both
     sides are halved, the worst first.
-
-    Args:
-        answers_at: frequencies ↦ amplitudes of the outputs, (frequencies, outputs).
-        omegas: frequencies, increasing, at least three.
-        values: the answers there, (frequencies, outputs).
-        outputs: their names.
-        most: frequencies that may be added.
-        infinite: frequencies of modes without damping; an interval that holds one is not halved.
     """
     least, left = NARROW * float(omegas[-1] - omegas[0]), most
     units = units_of(outputs)
@@ -278,9 +270,6 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     """Return the loads of a scene whose harmonic parts at the times SWEPT are 0, cos φ and sin φ times their amplitude.
 
     So a load Re(f̂ e^{iωt}) of any frequency, f̂ = amplitude e^{iφ}, can be put together.
-
-    Raises:
-        InputError: there is no harmonic load, or one that changes with time in another way.
     """
     made = Loads.of(scene.loads, scene.structure, motion.angle)
     changing = {name: load for name, load in made.named.items() if not load.constant}

@@ -132,11 +132,7 @@ class Simulation:
         return None
 
     def compute(self) -> Simulation:
-        """Compute the output at the rows, and nothing else; return this.
-
-        Raises:
-            ComputationError: it failed.
-        """
+        """Compute the output at the rows, and nothing else; return this."""
         if self.scene.time is None:
             self._steady()
         else:
@@ -145,11 +141,7 @@ class Simulation:
         return self
 
     def result(self) -> RunResult:
-        """Return the whole result of what was computed.
-
-        Raises:
-            ComputationError: a number of a row is not finite.
-        """
+        """Return the whole result of what was computed."""
         if self.times is not None:
             self.system.compile_readings()
             self.monitor.critical = critical_speed(self.system)
@@ -159,12 +151,7 @@ class Simulation:
         return self.summarised("done")
 
     def run(self, progress: Progress | None = None) -> RunResult:
-        """Return the result of the scene (see `rotfem.run`).
-
-        Raises:
-            ComputationError: it failed; its attribute `result` holds what was computed until then.
-            Stopped: it was interrupted; likewise.
-        """
+        """Return the result of the scene (see `rotfem.run`)."""
         progress = progress or (lambda share: None)
         try:
             if self.scene.time is None:
@@ -406,10 +393,6 @@ def simulate(
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
 
     `shown` takes the result before its error is estimated.
-
-    Raises:
-        Missed: its accuracy was not met.
-        ComputationError: it failed.
     """
     comm, clock = store.comm, clock_of(scene, store.comm, hint)
     scene.check_run()

@@ -150,11 +150,7 @@ def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
 
 
 def interval(text: str | int) -> float | int:
-    """Return the time (s, a float) from one checkpoint to the next of "30s", or the number of steps of "500".
-
-    Raises:
-        SceneError: it is none.
-    """
+    """Return the time (s, a float) from one checkpoint to the next of "30s", or the number of steps of "500"."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)(s?)", str(text))
     if found is None or float(found[1]) == 0.0 or not (found[2] or found[1].isdigit()):
         allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'

@@ -53,12 +53,7 @@ class Shapes:
         return self.x is None and not self.region
 
     def along(self, x: Array, towards: Array) -> Array:
-        """Return the shapes at places (n,), (shapes, n, components).
-
-        Args:
-            x: places along the span, m.
-            towards: places on the side of each whose value is taken at a jump, as the middles of their cells.
-        """
+        """Return the shapes at places (n,), (shapes, n, components)."""
         if self.x is None:
             return np.repeat(self.values, len(x), axis=1)
         side = x + 1e-6 * (towards - x)
@@ -269,13 +264,7 @@ class Loads:
 
     @classmethod
     def of(cls, given: Any, structure: Any, angle: Callable[[float], float]) -> Loads:
-        """Return the loads that a scene or a script gives, as sums.
-
-        Args:
-            given: table [loads], `rotfem.Loads`.
-            structure: of the scene, which they work on.
-            angle: time (s) ↦ angle of the hub (rad), for harmonics of it.
-        """
+        """Return the loads that a scene or a script gives, as sums."""
         named = {name: load_of(f"loads.{name}", load, structure, angle, kind) for name, load, kind in given.named()}
         return cls(given.gravity, named, tuple(point.x for point in given.at))
 
@@ -313,15 +302,7 @@ class Loads:
 def load_of(
     key: str, given: Any, structure: Any, angle: Callable[[float], float] | None = None, kind: str = "dead"
 ) -> AnyLoad:
-    """Return one load, or another signal.
-
-    Args:
-        key: of the scene.
-        given: what the scene has there.
-        structure: of the scene.
-        angle: time (s) ↦ angle of the hub (rad), for harmonics of it.
-        kind: "dead" or "follower".
-    """
+    """Return one load, or another signal."""
     planar = structure.is_planar
     size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
     over, value = given.over

@@ -21,13 +21,7 @@ def power_of_two(x: Any) -> Any:
 
 
 def unknown_scale(M: Any, K: Any, unit: float) -> Any:
-    """Return D as a PETSc vector of powers of two: 1/√K_ii, and of an unknown without stiffness 1/(u √M_ii).
-
-    Args:
-        M: mass matrix.
-        K: stiffness matrix.
-        unit: u, 1/s.
-    """
+    """Return D as a PETSc vector of powers of two: 1/√K_ii, and of an unknown without stiffness 1/(u √M_ii)."""
     d, mass = K.getDiagonal(), M.getDiagonal()
     size = np.abs(d.array)
     size = np.where(size > 0.0, size, unit**2 * np.abs(mass.array))
@@ -36,15 +30,7 @@ def unknown_scale(M: Any, K: Any, unit: float) -> Any:
 
 
 def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> tuple[tuple[Any, Any, Any], Array]:
-    """Return new matrices u² D M D, u D C D and D K D, and the owned part of D.
-
-    Args:
-        M: mass matrix.
-        C: gyroscopic and damping matrix.
-        K: stiffness matrix.
-        unit: u, a power of two, 1/s.
-        scale: D, a PETSc vector of powers of two; that of the diagonal if None.
-    """
+    """Return new matrices u² D M D, u D C D and D K D, and the owned part of D."""
     d = unknown_scale(M, K, unit) if scale is None else scale
     M, C, K = M.copy(), C.copy(), K.copy()
     for A, factor in ((M, unit**2), (C, unit), (K, 1.0)):
@@ -54,13 +40,7 @@ def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> tu
 
 
 def least_frequency(M: Any, K: Any, ksp: Any) -> float:
-    """Return about the least |ω| of K x = ω² M x, by two steps of inverse iteration; 0 if M is zero.
-
-    Args:
-        M: mass matrix.
-        K: stiffness matrix.
-        ksp: solver with K factorised.
-    """
+    """Return about the least |ω| of K x = ω² M x, by two steps of inverse iteration; 0 if M is zero."""
     x, f = K.createVecs()
     y = x.duplicate()
     x.array[:] = np.random.default_rng(x.comm.rank).standard_normal(x.getLocalSize())

@@ -29,16 +29,7 @@ def wrap(x: la.Vector) -> Any:
 
 
 def form_of(code: Any, module: Any, spaces: list[Any], functions: list[Any], constants: list[Any], data: Any) -> Any:
-    """Return a form of code that FFCx has compiled, on the mesh of its spaces (0.9 wants a pointer, 0.11 a list).
-
-    Args:
-        code: FFCx's form.
-        module: where it is.
-        spaces: of its arguments.
-        functions: its coefficients, in the order of the code.
-        constants: its constants likewise.
-        data: UFL's type of an integral ↦ list of its subdomain data.
-    """
+    """Return a form of code that FFCx has compiled, on the mesh of its spaces (0.9 wants a pointer, 0.11 a list)."""
     regions = {}
     for kind in (getattr(fem.IntegralType, name) for name in data):
         begin, end = (code.form_integral_offsets[kind.value + i] for i in (0, 1))

@@ -216,9 +216,6 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
 
     Those of unknowns without mass and damping are left out. A Krylov space that is to be the whole space breaks down
     before it is.
-
-    Raises:
-        ComputationError: the stiffness is singular, or there are no finite eigenvalues.
     """
     moves = np.any(M != 0.0, axis=1)
     finite = 2 * np.count_nonzero(moves) + np.count_nonzero(np.any(C != 0.0, axis=1) & ~moves)
@@ -307,13 +304,6 @@ class Pencil(Sendable):
         """Return at least `count` pairs (fewer if there are no more) of smallest |λ|, sorted by |λ|.
 
         A double zero, as of a hinge without a spring, is one of them, though round-off may part it into ±λ.
-
-        Args:
-            count: number of pairs; of conjugate ones, one counts.
-            target: shift, away from zero where zero is an eigenvalue (1/s).
-
-        Raises:
-            ComputationError: the solver did not converge, or a pair's backward error is above BACKWARD_TOLERANCE.
         """
         try:
             pairs = self._solve(count, target)
@@ -379,11 +369,7 @@ class Pencil(Sendable):
         return self._checked(self.unit * values, vectors, errors, ZERO_EIGENVALUE * self.unit if target > 0.0 else 0.0)
 
     def _checked(self, values: Array, vectors: tuple[Array, Array], errors: Array, small: float) -> Eigenpairs:
-        """Return pairs with their bounds, from right and left vectors.
-
-        Raises:
-            ComputationError: the backward error of one is above BACKWARD_TOLERANCE.
-        """
+        """Return pairs with their bounds, from right and left vectors."""
         right, left = vectors
         # A double zero eigenvalue (a rigid-body mode) is known beforehand, and never met to full accuracy.
         worst = float(np.max(errors[np.abs(values) > small], initial=0.0))

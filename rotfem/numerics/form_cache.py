@@ -34,11 +34,7 @@ FORM_OPTIONS = {name: value for name, (_, value, *_) in ffcx.options.FFCX_DEFAUL
 
 
 def jit_options(folder: Path, flags: list[str]) -> dict[str, Any]:
-    """Return all options of the compilation into a folder with these flags of the C compiler.
-
-    Raises:
-        InputError: a file of the user or the working folder has further options, or is none of options.
-    """
+    """Return all options of the compilation into a folder with these flags of the C compiler."""
     given = {"cache_dir": folder, "timeout": LONGEST_WAIT, "cffi_extra_compile_args": flags}
     parameters = inspect.signature(ffcx_jit.compile_forms).parameters.values()
     out = {p.name: p.default for p in parameters if p.name not in ("forms", "options")} | given

@@ -67,14 +67,7 @@ class Assembler:
         return self._with(np.zeros(len(self._pattern(kind)[2])), kind)
 
     def __call__(self, *several: Any, kind: str = "K", diagonal: float | None = None, into: Any = None) -> Any:
-        """Return compiled forms added up as a matrix.
-
-        Args:
-            several: the forms.
-            kind: of the matrix.
-            diagonal: of the rows and columns of constrained unknowns, zero otherwise; None without constraints.
-            into: a matrix that `zero` has made, to be overwritten; a new one if None.
-        """
+        """Return compiled forms added up as a matrix."""
         entries, (kept, *csr) = self._assembled(*several, diagonal=diagonal), self._pattern(kind)
         entries = entries if kept is None else entries[kept]
         if into is None:
@@ -91,9 +84,6 @@ class Assembler:
         """Take components of nodes that no form couples out of the pattern, as those of a flat plate in and across it.
 
         The factor fills in by as much less.
-
-        Args:
-            several: compiled forms of each kind of matrix that has its own pattern; "K" has the entries of all.
         """
         (_, rows, columns), block = self._patterns["K"], self._block
         neighbours = np.diff(rows) // block
@@ -156,15 +146,7 @@ FLAGS = ("-g0", "-w")
 
 
 def form(f: Any, once: bool = False) -> Any:
-    """Return a UFL form compiled, over the communicator of its mesh.
-
-    Args:
-        f: the form.
-        once: whether it is assembled a few times only, and compiled in haste.
-
-    Raises:
-        RuntimeError: the compiler failed.
-    """
+    """Return a UFL form compiled, over the communicator of its mesh."""
     mesh = f.ufl_domains()[0].ufl_cargo()
     return _compiled(fem.form, f, comm=mesh.comm, flag=(SELDOM if once else OFTEN)[mesh.topology.dim])
 
@@ -196,13 +178,7 @@ class MeshFree(NamedTuple):
     rank: int
 
     def on(self, V: fem.FunctionSpace, whole: tuple[Sequence[Any], Sequence[Any]], regions: Any) -> tuple[Any, Any]:
-        """Return (constants of each integral, compiled form) on the mesh of a space of the arguments.
-
-        Args:
-            V: the space.
-            whole: coefficients and constants there, in the order of `mesh_free`.
-            regions: type of integral ↦ its subdomain data.
-        """
+        """Return (constants of each integral, compiled form) on the mesh of a space of the arguments."""
         coefficients = [whole[0][i] for i in self.coefficients]
         constants = [whole[1][i] for i in self.constants]
         made = compat.form_of(*self.code, [V] * self.rank, coefficients, constants, regions)
@@ -210,13 +186,7 @@ class MeshFree(NamedTuple):
 
 
 def mesh_free(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]]) -> MeshFree | None:
-    """Return a UFL form and what `form` makes of it without its mesh; None where it has more than a whole.
-
-    Args:
-        f: the form.
-        compiled: it compiled.
-        whole: coefficients and constants of a form that another one with its signature has at the same places.
-    """
+    """Return a UFL form and what `form` makes of it without its mesh; None where it has more than a whole."""
     code, functions, (coefficients, constants) = compiled.ufcx_form, f.coefficients(), whole
     used = [functions[code.original_coefficient_positions[i]] for i in range(code.num_coefficients)]
     if any(x not in coefficients for x in used) or any(x not in constants for x in f.constants()):
@@ -243,11 +213,7 @@ def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:
 
 
 def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
-    """Return a UFL expression compiled for evaluation at points of the reference cell, shape (number, dim).
-
-    Raises:
-        RuntimeError: the compiler failed.
-    """
+    """Return a UFL expression compiled for evaluation at points of the reference cell, shape (number, dim)."""
     return _compiled(fem.Expression, e, points, comm, comm=comm, flag="-O2")
 
 
@@ -273,13 +239,6 @@ def at_rest(f: Any, q: Any, v: Any, a: Any, undeformed: bool = False) -> dict[st
     """Return f and its derivatives K, C and M to q, v and a, at v = a = 0, as UFL forms; they may be empty.
 
     Expanded once: each derivative is that of what is left where the others vanish.
-
-    Args:
-        f: the form.
-        q: function in it.
-        v: its rate.
-        a: its acceleration.
-        undeformed: whether they are wanted at q = 0 too.
     """
     expanded, du = expand_derivatives(f), ufl.TrialFunction(q.function_space)
     rest = zeroed(expanded, v, a)

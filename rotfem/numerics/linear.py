@@ -66,15 +66,7 @@ def transposed(A: Any) -> Any:
 
 
 def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool = False, small: int = SMALL) -> None:
-    """Make a KSP apply one factorisation: PETSc's own LU up to SMALL unknowns, MUMPS above.
-
-    Args:
-        ksp: PETSc KSP.
-        size: number of unknowns.
-        symmetric: whether the matrix is (it may be indefinite); MUMPS then needs half the memory.
-        pivots: whether rows must change places, as where zeros are on the diagonal: PETSc's own LU does not.
-        small: another number than SMALL.
-    """
+    """Make a KSP apply one factorisation: PETSc's own LU up to SMALL unknowns, MUMPS above."""
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
     large = pivots or size > small or ksp.comm.size > 1
@@ -122,11 +114,7 @@ class DirectSolver:
             self._whole, self.A = A, sparse_part(A)
 
     def factorise(self) -> None:
-        """Make the factor of the entries of now.
-
-        Raises:
-            ComputationError: A is singular to working precision.
-        """
+        """Make the factor of the entries of now."""
         self.factorisations += 1
         if not self._counting:
             self._set_up()
@@ -182,11 +170,7 @@ class DirectSolver:
         return int(negative)
 
     def solve(self, b: Any) -> Array:
-        """Return the owned rows of the solution of A x = b, a PETSc vector.
-
-        Raises:
-            ComputationError: A is singular to working precision.
-        """
+        """Return the owned rows of the solution of A x = b, a PETSc vector."""
         if self._stale:
             self.factorise()
         self._ksp.solve(b, self._x)
@@ -196,11 +180,7 @@ class DirectSolver:
         return x if self._update is None else self._update(x)
 
     def solve_all(self, right: Array) -> Array:
-        """Return the solutions for columns of owned rows, (n, m), which is quicker than one after the other.
-
-        Raises:
-            ComputationError: A is singular to working precision.
-        """
+        """Return the solutions for columns of owned rows, (n, m), which is quicker than one after the other."""
         if self._stale:
             self.factorise()
         out = self._columns(right)
@@ -227,9 +207,6 @@ def negative_eigenvalues(A: Any) -> int:
     """Return how many eigenvalues of a symmetric PETSc matrix are negative, on every rank.
 
     A factor of Cholesky is a proof that none is; where there is no such factor MUMPS counts, which pivots.
-
-    Raises:
-        ComputationError: the matrix is singular or not finite.
     """
     # of a copy, as its entries may be those of another matrix next, that is not symmetric
     solver = DirectSolver(A.copy(), symmetric=True, counting=True)
@@ -328,11 +305,7 @@ class ComplexSolver:
         self._solver.refresh()
 
     def solve(self, b: Complex) -> Complex:
-        """Return the owned part of the solution, of the owned part of a right-hand side.
-
-        Raises:
-            ComputationError: the matrix is singular to working precision.
-        """
+        """Return the owned part of the solution, of the owned part of a right-hand side."""
         self._b.array[:] = 0.0
         self._b.array[: 2 * len(b)] = np.ascontiguousarray(b).view(np.float64)
         return self._solver.solve(self._b)[: 2 * len(b)].view(np.complex128)

@@ -88,18 +88,7 @@ class Newton:
         size: Callable[[], float],
         factor: Factor | None = None,
     ) -> int:
-        """Repeat `increment` until it is small; return the number of iterations.
-
-        Args:
-            increment: one linear solve, with a new tangent or with the factor at hand; applies it and returns its
-                scaled maximum norm, and whether it is exact.
-            size: scaled maximum norm of the unknown, against which round-off is judged.
-            factor: what decides which increments are made with an old factor; None of none. Those shrink by a constant
-                rate only, and nothing is predicted from the first.
-
-        Raises:
-            ComputationError: not finite, growing, or too many iterations; says which.
-        """
+        """Repeat `increment` until it is small; return the number of iterations."""
         self.diverging = self.wandered = False
         previous, first, stalled, k, tangents = np.inf, np.inf, 0, 0, 0
         while tangents < self.max_iterations and k < 3 * self.max_iterations:

@@ -108,11 +108,6 @@ def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array
 
     Directions whose energy is below 1e-13 of the largest are dropped: the others hold them to round-off. A larger part
     would drop what makes the small differences between modes at two speeds.
-
-    Args:
-        comm: communicator that the rows are distributed over.
-        columns: of any lengths.
-        product: X ↦ B X of the inner product x·B y.
     """
     energies = summed(comm, np.einsum("ij,ij->j", columns, product(columns)))
     V: Array = columns / np.sqrt(np.maximum(energies, 1e-300))
@@ -249,14 +244,7 @@ class Update:
 
 
 def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
-    """Return [[A, column], [row, corner]] as a new matrix of the kind of A; the last rank holds the new row.
-
-    Args:
-        A: square PETSc matrix, or `PlusLowRank`.
-        row: owned part of the new row.
-        column: owned part of the new column.
-        corner: the last diagonal entry.
-    """
+    """Return [[A, column], [row, corner]] as a new matrix of the kind of A; the last rank holds the new row."""
     if isinstance(A, PlusLowRank):
         return PlusLowRank(bordered(A.sparse, row, column, corner), A.part.bordered(), A.factor)
     comm = A.comm.tompi4py()

@@ -55,9 +55,6 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
 
     With λ = target + λ', the least λ' are the largest eigenvalues of the linear form in 1/λ', so that stiff directions
     do not spoil them; with K on the right they would set the size of the error for all.
-
-    Raises:
-        ComputationError: the stiffness, or with a target its sum with damping, is singular.
     """
     from scipy.linalg import eig  # slow to load, and most commands solve no eigenproblem
 
@@ -84,17 +81,7 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
 def gyroscopic_pairs(
     matrices: tuple[Any, Any, Any], scale: Array, solver: DirectSolver, count: int
 ) -> tuple[Array, Array, Array]:
-    """Return (λ, x, normwise backward error) of at least `count` pairs nearest to zero, and of their conjugates.
-
-    Args:
-        matrices: M, C, K, PETSc matrices.
-        scale: D of the unknowns that D K D has a diagonal of about one with, owned rows.
-        solver: of K.
-        count: number of pairs; of conjugate ones, one counts.
-
-    Raises:
-        ComputationError: they do not converge, or K is singular.
-    """
+    """Return (λ, x, normwise backward error) of at least `count` pairs nearest to zero, and of their conjugates."""
     comm: MPI.Comm = matrices[0].comm.tompi4py()
     wanted, random, d = 2 * count + 2, np.random.default_rng(comm.rank), scale[:, None]
     norms = [_norm(comm, A, d * random.choice([-1.0, 1.0], d.shape), d) for A in matrices]
@@ -176,11 +163,6 @@ def turn_equal(values: Array, vectors: tuple[Array, Array], matrices: tuple[Arra
     """Make eigenvalues that are one real one equal, in place; turn their vectors to shapes of their own frequencies.
 
     With C = η K + M/η all slow eigenvalues are −1/η, and any combination of their shapes is one.
-
-    Args:
-        values: λ, those of conjugate pairs both.
-        vectors: x and y, columns.
-        matrices: M, C, K.
     """
     from scipy.linalg import eig
 
@@ -243,11 +225,7 @@ class RitzPairs:
         return int(W.shape[1])
 
     def solve(self, count: int) -> None:
-        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair.
-
-        Raises:
-            ComputationError: no eigenvalue is one that can be computed with.
-        """
+        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair."""
         m, c, k = (summed(self.comm, self.V.T @ P) for P in self._products)
         values, x, y = quadratic(m, c, k, self.target)
         turn_equal(values, (x, y), (m, c, k))
@@ -285,9 +263,6 @@ class RitzPairs:
 
         They are K⁻¹ times the residuals: residual inverse iteration (Neumaier 1985), quick where λ is near the target.
         A real λ of an overdamped pair may be far from it: its own are P(λ)⁻¹ P'(λ) x, Newton's method for P(λ) x = 0.
-
-        Args:
-            own: whether real pairs have their own.
         """
         M, C, _ = self.matrices
         columns = []
@@ -306,14 +281,7 @@ class RitzPairs:
 
 
 def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float) -> tuple[Array, Array, Array, Array]:
-    """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
-
-    Args:
-        matrices: M, C, K, balanced.
-        undamped: vectors of the pencil without damping, columns of owned unknowns.
-        count: number of pairs.
-        target: see `RitzPairs`.
-    """
+    """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping."""
     start = np.hstack([undamped.real, undamped.imag])
     ritz = RitzPairs(matrices, start, target)
     for number in range(12):

@@ -25,12 +25,7 @@ FORMAT = 3
 
 
 def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
-    """Write a tree of dicts, lists, tuples, dataclasses, arrays, numbers and texts, whole or not at all.
-
-    Raises:
-        OutputError: it cannot be written; the one before is still there.
-        ComputationError: something in it is of another type.
-    """
+    """Write a tree of dicts, lists, tuples, dataclasses, arrays, numbers and texts, whole or not at all."""
     arrays: dict[str, Any] = {}
     head = json.dumps({"format": FORMAT, "tree": _plain(tree, "", arrays)}).encode()
     image = io.BytesIO()
@@ -40,11 +35,7 @@ def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Return the tree of a checkpoint file.
-
-    Raises:
-        SceneError: there is none, or it is damaged, of another format, or no checkpoint.
-    """
+    """Return the tree of a checkpoint file."""
     if not path.exists():
         why = "there is no checkpoint; start the run with --checkpoint, and without --resume"
         raise SceneError("command line", "--resume", path, why)
@@ -59,11 +50,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def checkpoint_of(path: Path) -> Iterator[None]:
-    """Say in one error that a file is not a checkpoint of this program.
-
-    Raises:
-        SceneError: in the place of what goes wrong with it.
-    """
+    """Say in one error that a file is not a checkpoint of this program."""
     try:
         yield
     except SceneError:
@@ -74,11 +61,7 @@ def checkpoint_of(path: Path) -> Iterator[None]:
 
 
 def _plain(value: Any, name: str, arrays: dict[str, Any]) -> Any:
-    """Return a tree that JSON knows; arrays are put into a dict by their path in the tree, and referred to by it.
-
-    Raises:
-        ComputationError: something in it is of another type.
-    """
+    """Return a tree that JSON knows; arrays are put into a dict by their path in the tree, and referred to by it."""
 
     def inner(entries: Any) -> dict[str, Any]:
         return {str(key): _plain(entry, f"{name}.{key}".strip("."), arrays) for key, entry in entries}

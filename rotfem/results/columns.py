@@ -220,11 +220,7 @@ class Columns:
         return table.set_index(list(self.index)) if self.index and not table.empty else table
 
     def write_hdf5(self, path: Path) -> Path:
-        """Write the columns as HDF5 datasets over their dimensions, with their units; return the path.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write the columns as HDF5 datasets over their dimensions, with their units; return the path."""
         with whole_hdf5(path) as file:
             for name, (_, values) in self.variables().items():
                 data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)

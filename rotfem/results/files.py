@@ -85,11 +85,7 @@ def write_text(path: Path, text: str) -> Path:
 
 
 def write_whole(path: Path, content: bytes | memoryview) -> Path:
-    """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path.
-
-    Raises:
-        OutputError: it cannot be written; the one before is still there.
-    """
+    """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path."""
     with writing(path):
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
@@ -109,9 +105,6 @@ def whole_hdf5(path: Path) -> Iterator[Any]:
     """Yield an HDF5 file (`h5py.File`) to be filled, which is written whole or not at all.
 
     It is made in memory: HDF5 cannot close a file that there is no room for, and Python crashes where it ends.
-
-    Raises:
-        OutputError: it cannot be written; the one before is still there.
     """
     import h5py  # takes longer than all other imports of this package
 

@@ -45,12 +45,7 @@ ELASTODYN = {("flap", 1): "BldFl1Sh", ("flap", 2): "BldFl2Sh", ("lag", 1): "BldE
 
 
 def fit(span: Array, shape: Array) -> tuple[Array, Array]:
-    """Return c₂ … c₆ of the polynomial that is 1 at ξ = 1 and closest to a shape, and what it is off, (n,).
-
-    Args:
-        span: ξ of the nodes, (n,).
-        shape: displacement there, 1 at the tip, (n,).
-    """
+    """Return c₂ … c₆ of the polynomial that is 1 at ξ = 1 and closest to a shape, and what it is off, (n,)."""
     powers = span[:, None] ** np.array(POWERS)
     # With c₂ = 1 − c₃ − … − c₆ the sum is 1 whatever the others are.
     others, *_ = np.linalg.lstsq(powers[:, 1:] - powers[:, :1], shape - powers[:, 0], rcond=None)

@@ -66,14 +66,6 @@ def panels_over(
     """Return a figure and its panels over an abscissa, the first column filled first.
 
     Places are fixed, as what Matplotlib finds by itself takes it longer than all the rest.
-
-    Args:
-        x: label of the abscissa.
-        number: of the panels.
-        title: of the figure.
-        columns: of panels; one to three, by their number, if 0.
-        below: what is left free there for a legend, inch.
-        beside: likewise.
     """
     columns = columns or (1 if number <= 3 else 2 if number <= 12 else 3)
     rows = -(-max(number, 1) // columns)

@@ -52,11 +52,7 @@ MERITS = {
 
 
 def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
-    """Write report.html of a result, with a drawing of the scene's structure, into a folder; return its path.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """Write report.html of a result, with a drawing of the scene's structure, into a folder; return its path."""
     from bokeh.embed import components
     from bokeh.resources import Resources
 

@@ -88,11 +88,7 @@ class Result(ABC):
         return {self.summary["command"]: self.table}
 
     def column(self, name: str) -> Array:
-        """Return the numbers of a column of the main table, such as `frequency`: of every row, or over its grid.
-
-        Raises:
-            KeyError: there is none of that name.
-        """
+        """Return the numbers of a column of the main table, such as `frequency`: of every row, or over its grid."""
         table = self.table
         if name not in (numbers := table.numbers):
             raise KeyError(f"no number {name!r} in the table; there are {', '.join(numbers)}")
@@ -135,11 +131,7 @@ class Result(ABC):
         return dataset(self.arrays(), frame | {name: self.summary[name] for name in names if name in self.summary})
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write the files into a folder, in the place of the results that are there; return their paths.
-
-        Raises:
-            OutputError: the folder cannot be written, or is neither empty nor one of rotfem's.
-        """
+        """Write the files into a folder, in the place of the results that are there; return their paths."""
         from rotfem.listeners import ONE_PROCESS
         from rotfem.results.result_set import ResultFolder
 
@@ -147,24 +139,11 @@ class Result(ABC):
             return results.publish(self)
 
     def draw(self, folder: Path) -> list[Path]:
-        """Write all figures into a folder; return their paths.
-
-        Raises:
-            OutputError: one cannot be written.
-        """
+        """Write all figures into a folder; return their paths."""
         return [save(draw(), folder / name) for name, draw in self.drawings().items()]
 
     def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
-        """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it.
-
-        Args:
-            path: file to write it to as well, in the format of its ending (png, pdf, svg, …).
-            drawing: which of `drawings`, with or without its ending; the main one if empty.
-
-        Raises:
-            ValueError: there is no such drawing, or the format is not one of Matplotlib's.
-            OutputError: the file cannot be written.
-        """
+        """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it."""
         drawings = {name.removesuffix(".png"): draw for name, draw in self.drawings().items()}
         name = drawing.removesuffix(".png") or next(iter(drawings), "")
         if name not in drawings:
@@ -217,11 +196,7 @@ class OfTable:
 
 
 def image(figure: Figure, dpi: int, format: str = "png") -> bytes:
-    """Return a figure as an image of so many dots per inch.
-
-    Raises:
-        ValueError: Matplotlib does not write that format.
-    """
+    """Return a figure as an image of so many dots per inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     file = BytesIO()
@@ -242,10 +217,5 @@ def data_url(figure: Figure, dpi: int) -> str:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure whole or not at all, in the format of the file's ending, PNG if it has none; return the path.
-
-    Raises:
-        ValueError: Matplotlib does not write that format.
-        OutputError: it cannot be written.
-    """
+    """Write a figure whole or not at all, in the format of the file's ending, PNG if it has none; return the path."""
     return write_whole(path, image(figure, 100, path.suffix[1:] or "png"))

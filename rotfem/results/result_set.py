@@ -166,11 +166,7 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
 
 
 def check_own(folder: Path, inputs: Iterable[Path] = ()) -> None:
-    """Make a folder, and see that results may be written there.
-
-    Raises:
-        OutputError: see `ResultFolder`.
-    """
+    """Make a folder, and see that results may be written there."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -194,11 +190,7 @@ def is_ours(summary: Mapping[str, Any]) -> bool:
 
 
 def said_of(folder: Path) -> str:
-    """Return in words how the computation of a folder ended, and what there is of one that is not complete.
-
-    Raises:
-        OutputError: there is none of rotfem's.
-    """
+    """Return in words how the computation of a folder ended, and what there is of one that is not complete."""
     summary = read_summary(folder)
     if not is_ours(summary):
         raise OutputError(folder, "there are no results of rotfem")

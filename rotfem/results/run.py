@@ -36,11 +36,7 @@ class StationHistory:
     __repr__ = short_fields
 
     def __getitem__(self, name: str) -> Array:
-        """Return a quantity at all times and stations, (n, m).
-
-        Raises:
-            KeyError: there is none of that name.
-        """
+        """Return a quantity at all times and stations, (n, m)."""
         if name not in self.values:
             raise KeyError(f"no quantity {name!r} at the stations; there are {', '.join(self.values)}")
         return self.values[name]

@@ -98,10 +98,6 @@ def animate(result: Any, mode: int, folder: Path) -> list[Path]:
     """Write mode_N.png and mode_N.gif of a `ModesResult`: a mode at its largest and through one period, in space.
 
     Mode 1 is the first that is none of a rigid body. The paths are returned.
-
-    Raises:
-        SceneError: there is no such mode.
-        OutputError: PyVista is not installed, or a file cannot be written.
     """
     surface, there = result.surface, len(result.shapes)
     if surface is None or not 1 <= mode <= there:

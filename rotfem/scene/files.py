@@ -48,11 +48,7 @@ class Unreadable(Exception):
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a file.
-
-    Raises:
-        Unreadable: there is none, it is a directory, or it may not be read.
-    """
+    """Return the content of a file."""
     note(path)
     try:
         return path.read_bytes()
@@ -68,11 +64,7 @@ _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Raises:
-        SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
-    """
+    """Return the content of a TOML file."""
     try:
         return tomllib.loads(read_bytes(path).decode("utf-8-sig"))
     except Unreadable as error:
@@ -90,9 +82,6 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
     """Return key and value of an override such as `model.theory=linear`.
 
     The value is read as TOML where that is possible and is a string otherwise.
-
-    Raises:
-        SceneError: it is not of the form `table.key=value`.
     """
     key, equals, text = (part.strip() for part in override.partition("="))
     if not equals or not text or not _KEY.fullmatch(key):

@@ -94,12 +94,7 @@ class ReferenceLine:
         return tuple(inner[1:].tolist())
 
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) in m.
-
-        Args:
-            x: arc lengths.
-            near: of each an arc length on the same side of a kink, which decides at the kink itself; x where None.
-        """
+        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) in m."""
         x = np.clip(np.atleast_1d(np.asarray(x, dtype=np.float64)), 0.0, self.length)
         side = x if near is None else np.atleast_1d(np.asarray(near, dtype=np.float64))
         piece = np.searchsorted(self.kinks, side, side="right")

@@ -115,16 +115,7 @@ class Scene(SceneModel):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene", directory: str | Path = ".") -> Self:
-        """Return the validated scene of nested tables.
-
-        Args:
-            data: the tables as in a TOML file; NumPy arrays and Python functions are welcome.
-            name: name of the scene, used in errors and for the folder of results.
-            directory: where relative paths in the scene start.
-
-        Raises:
-            SceneError: anything in it is not valid.
-        """
+        """Return the validated scene of nested tables."""
         return cls._validate(data, name, name, str(directory))
 
     @classmethod
@@ -185,14 +176,7 @@ class Scene(SceneModel):
         return self._tables
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
-        """Return a variant of the scene, validated from what the user set, with the changes and fresh defaults.
-
-        Args:
-            changes: dotted key → new value, e.g. `{"model.theory": "linear"}`; None removes what was set.
-
-        Raises:
-            SceneError: the result is not valid.
-        """
+        """Return a variant of the scene, validated from what the user set, with the changes and fresh defaults."""
         tables = set_keys(self._file, self._tables, changes.items())
         variant = type(self)._validate(tables, self._name, self._file, self._directory)
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
@@ -219,11 +203,7 @@ class Scene(SceneModel):
         return digest
 
     def check_run(self) -> None:
-        """Check that the scene can be run: a time history needs times, a steady state a constant speed.
-
-        Raises:
-            SceneError: there is no [time] table though the motion is not constant, or starts in a way of its own.
-        """
+        """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
@@ -236,14 +216,7 @@ class Scene(SceneModel):
         self.check_tables("a steady state" if self.time is None else "")
 
     def check_tables(self, when: str) -> None:
-        """Check that no table of a load along the structure may be of two kinds.
-
-        Args:
-            when: what is computed at one time, where loads have no signal over it; "" for a history.
-
-        Raises:
-            SceneError: there is one.
-        """
+        """Check that no table of a load along the structure may be of two kinds."""
         check_tables(self._file, self.structure, self.loads, when)
 
     def _check(self) -> None:
@@ -251,16 +224,7 @@ class Scene(SceneModel):
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Return the validated scene of a TOML file.
-
-    Args:
-        path: the file; relative paths inside it start at its folder.
-        overrides: changes such as "model.theory=linear", applied in order. The value is read as TOML where
-            possible and as a string otherwise.
-
-    Raises:
-        SceneError: the file cannot be read, an override is malformed, or anything in the scene is not valid.
-    """
+    """Return the validated scene of a TOML file."""
     path = Path(path)
     with noted_files() as files:
         tables = apply_overrides(path.name, read_toml(path), overrides)

@@ -447,14 +447,7 @@ def mass_matrices(m: Array, J2: Array, J3: Array, center: npt.ArrayLike, angle: 
 
 
 def about_reference(matrix: Array, axial: npt.ArrayLike, transverse: npt.ArrayLike, angle: npt.ArrayLike) -> Array:
-    """Return Bᵀ M B (…, 6, 6) along section axes about the reference axis, of M along turned axes and about centres.
-
-    Args:
-        matrix: M.
-        axial: centre (y, z) that axial strain and bending are about, (…, 2) in m.
-        transverse: centre that shear and twist are about.
-        angle: of the turn about axis 1 from the section axes (rad).
-    """
+    """Return Bᵀ M B (…, 6, 6) along section axes about the reference axis, of M along turned axes and about centres."""
     B = np.swapaxes(about_axis(angle), -1, -2) @ shifted(axial, transverse)
     return np.asarray(np.swapaxes(B, -1, -2) @ matrix @ B)
 

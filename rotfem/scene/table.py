@@ -30,13 +30,7 @@ from rotfem.units import is_quantity, quantity
 
 
 def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
-    """Return a validation error that names a key.
-
-    Args:
-        key: dotted path relative to the table being validated; empty for the validated value itself.
-        value: the offending value, None if the key is absent.
-        allowed: what is wrong and what is allowed.
-    """
+    """Return a validation error that names a key."""
     return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
 
 
@@ -87,15 +81,6 @@ def in_units(value: Any, units: Sequence[str], over: Sequence[str] = ()) -> Any:
     """Return a value with numbers in the place of texts with units, such as "12.1 rpm".
 
     A text that is no number with a unit stays, for who wants a number, or the path of a file.
-
-    Args:
-        value: number, vector, rows, or a table of them by name.
-        units: of the components of a vector or the columns of rows, the last one of all further ones. "" stands for
-            that of SI.
-        over: units of the columns of rows that are before these.
-
-    Raises:
-        PydanticCustomError: the unit of one is not of the kind that is wanted.
     """
     if isinstance(value, Mapping):
         return {key: in_units(entry, units, over) for key, entry in value.items()}
@@ -141,11 +126,7 @@ class SceneModel(BaseModel):
     GONE: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, **data: Any) -> None:
-        """Make a table in a script; values may be texts with units, as in a scene.
-
-        Raises:
-            SceneError: it is not valid; the name of the class stands for that of the file.
-        """
+        """Make a table in a script; values may be texts with units, as in a scene."""
         try:
             super().__init__(**data)
         except ValidationError as error:

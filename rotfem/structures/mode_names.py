@@ -81,12 +81,7 @@ class Wave:
         return 1 if self.fixed else 2 if self.shaft else self.number
 
     def seen_fixed(self, omega: float, speed: float) -> float:
-        """Return the frequency ω in the fixed frame, rad/s: positive with the spin, negative against it.
-
-        Args:
-            omega: frequency in the frame of the mode, rad/s.
-            speed: Ω ≥ 0, rad/s.
-        """
+        """Return the frequency ω in the fixed frame, rad/s: positive with the spin, negative against it."""
         return (omega if self.share > 0.0 else -omega) + (0.0 if self.fixed else self.number * speed)
 
     def direction(self, omega: float, speed: float) -> str:
@@ -102,13 +97,7 @@ class Wave:
 
 
 def shaft_wave(moves: npt.NDArray[Any], turns: npt.NDArray[Any], axis: npt.NDArray[np.float64]) -> Wave:
-    """Return the whirl of a mode of a shaft; that of torsion and stretch stands.
-
-    Args:
-        moves: complex displacements of the nodes, frame components, (n, 3).
-        turns: rotations there, times the length of the shaft, (n, 3).
-        axis: direction of the spin, a unit vector (3,).
-    """
+    """Return the whirl of a mode of a shaft; that of torsion and stretch stands."""
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     first /= np.linalg.norm(first)
     y, z = moves @ first, moves @ np.cross(axis, first)
@@ -138,11 +127,6 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
     A plate clamped along an edge has "nth bending" (n − 1 nodal lines across it, none along), "nth torsion" (one line
     along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk clamped inside "m nodal diameters, s
     circles", beside the clamp.
-
-    Args:
-        family: "bending" or "in-plane".
-        coordinates: x, y of the nodes and whether they are clamped ("clamped"), (n,) each.
-        y: the transverse (or, of in-plane modes, the in-plane) displacement at the nodes, complex, (n,).
     """
     real = in_phase(y)
     x1, x2 = coordinates["x"], coordinates["y"]
@@ -160,13 +144,7 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
 
 
 def disk_wave(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any], axis: float) -> Wave | None:
-    """Return how a mode w e^{iωt} of a disk travels; None of other plates.
-
-    Args:
-        coordinates: x, y of the nodes, (n,) each.
-        w: the transverse displacement at the nodes, complex, (n,).
-        axis: component of the spin's direction along the normal.
-    """
+    """Return how a mode w e^{iωt} of a disk travels; None of other plates."""
     x, y = coordinates["x"] - np.mean(coordinates["x"]), coordinates["y"] - np.mean(coordinates["y"])
     if not _is_disk(x, y):
         return None
@@ -246,12 +224,6 @@ def with_overdamped(
 
     The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
     undamped mode becomes one that vibrates, or a slow and a fast one.
-
-    Args:
-        names: of every mode, in the order of the undamped frequencies of the shapes.
-        values: λ, 1/s.
-        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
-        sure: of which modes round-off leaves the sign of λ and of x^H K x. It does not at a hinge without a spring.
     """
     mass, stiffness = (np.real(e) for e in energies)
     over = (values.imag == 0.0) & (mass > 0.0) & (~sure | ((values.real < 0.0) & (stiffness > 0.0)))
@@ -279,12 +251,6 @@ def with_whirl(names: list[ModeName], waves: Sequence[Wave], omega: npt.NDArray[
     The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
     those of its direction, by the frequency in the fixed frame: "2nd backward whirl". Shafts that do not whirl bend,
     neither flapwise nor edgewise.
-
-    Args:
-        names: of every mode.
-        waves: their precession.
-        omega: their frequencies in the rotor, rad/s.
-        speed: Ω ≥ 0, rad/s.
     """
     ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
     out = [name._replace(rest=way or name.rest) for name, way in zip(names, ways, strict=True)]

@@ -26,16 +26,7 @@ class BadMesh(Exception):
 
 
 def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
-    """Return the physical curves and surfaces of a file, whose model gmsh then holds, its nodes numbered from 1.
-
-    Args:
-        gmsh: the module; it is initialised here.
-        path: the file.
-        surfaces: names of the physical surfaces that must make up the plate.
-
-    Raises:
-        BadMesh: the file is not the mesh of a plate.
-    """
+    """Return the physical curves and surfaces of a file, whose model gmsh then holds, its nodes numbered from 1."""
     if path.suffix != ".msh":
         raise BadMesh("must be a mesh file of gmsh, with the ending .msh")
     with path.open("rb") as file:  # gmsh runs what begins otherwise as a script, with all that it asks of the system
@@ -126,16 +117,7 @@ def _check_flat(x: Array) -> None:
 
 
 def check_cells(x: Array, cells: Integers, curves: Mapping[str, Integers]) -> None:
-    """Refuse cells without area, that overlap at an edge, or that nothing holds, and curves along no edges of cells.
-
-    Args:
-        x: nodes in the plane, shape (m, 2), m.
-        cells: rows of x of the corners, in order around each cell, shape (n, 3) or (n, 4).
-        curves: name ↦ ends of its edges, likewise, shape (k, 2); "clamped" is one.
-
-    Raises:
-        BadMesh: says where.
-    """
+    """Refuse cells without area, that overlap at an edge, or that nothing holds, and curves along no edges of cells."""
     from scipy.sparse import coo_array  # slow to load, and only mesh files need it
     from scipy.sparse.csgraph import connected_components
 
