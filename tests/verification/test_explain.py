@@ -433,21 +433,19 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
     assert any("gravity turns in the rotating frame: taken as at t = 0" in line for line in found["warnings"])
 
 
-@pytest.mark.parametrize(
-    ("changes", "shown"),
-    [
-        ({"time": {"end": 20.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED}, "unknown"),
-        ({"model.theory": "linear", "motion.speed": 9.0}, "inf"),
-    ],
-    ids=["steps of more than a period", "diverges"],
-)
-def test_what_is_not_known_is_reported(changes: dict[str, Any], shown: str) -> None:
-    result = rotfem.explain(scene(SPIN_UP, changes))
+def test_steps_of_more_than_a_period_do_not_matter() -> None:
+    """The comparison has steps of its own; the truth is of adaptive steps."""
+    asked = scene(SPIN_UP, {"time": {"end": 20.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED})
+    fine = asked.replace({"time": {"end": 20.0, "tolerance": 1e-4, "output_step": 0.05}, "output.error": False})
+    rest = ["centrifugal", "rotary_inertia"]
+    true = distance(tip(rotfem.run(fine)), tip(rotfem.run(fine.replace({"model.effects": rest}))))
+    assert true / 3 < rows_of(asked)["coriolis"]["estimate"][HISTORY] < 3 * true
+
+
+def test_an_own_model_that_fails_is_reported() -> None:
+    result = rotfem.explain(scene(SPIN_UP, {"model.theory": "linear", "motion.speed": 9.0}))
     coriolis = next(line for line in report(result) if line.startswith("without coriolis"))
-    assert coriolis.split()[2] == shown
-    # what a history has reached, until it fails: a slender beam turns by some 1.4 of what it deflects
-    groups = result.summary["groups"]
-    assert groups["rotation"] / 2 < groups["deflection"] <= groups["rotation"]
+    assert coriolis.split()[2] == "inf"
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
     assert '"estimate"' in result.files()["explain.json"]
     result.drawings()["explain.png"]()
