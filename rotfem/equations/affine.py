@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -68,12 +68,6 @@ class AffineSystem(System):
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed, self.settled = True, False
-
-    def twin(self) -> Self:
-        """Return another system of the same pieces (see `System.twin`)."""
-        other = super().twin()
-        other._make_operators()
-        return other
 
     def check_terms(self) -> None:
         """Refuse terms of a user that are no polynomials of the constants."""

@@ -10,10 +10,9 @@ it is solved by block elimination, with one factorisation for both right-hand si
 
 from __future__ import annotations
 
-from copy import copy
 from functools import cached_property
 from time import perf_counter
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -160,14 +159,6 @@ class BorderedSystem:
         if name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
-
-    def twin(self) -> Self:
-        """Return another system of the same forms (see `System.twin`)."""
-        other = copy(self)
-        other.inner = self.inner.twin()
-        other._row = self.inner.compilations, copy(self.row)
-        other._row[1].system = other.inner
-        return other
 
     @property
     def row(self) -> HubRow:

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection
-from copy import copy
 from functools import cached_property, lru_cache
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -110,18 +109,6 @@ class System(Solutions, ABC):
         #: Whether a factor is kept over steps: where a factorisation takes much longer than a solution.
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
-    def twin(self) -> Self:
-        """Return another system of the same forms, functions and constants, with matrices and a factor of its own.
-
-        Two marches may alternate: each writes its state and time before it reads anything.
-        """
-        other = copy(self)
-        vars(other).pop("balance", None)
-        other._solver, other._mass, other.analysed = None, None, None
-        other.seconds = {"assemble": 0.0, "solve": 0.0}
-        other.A = self.assembler.zero()
-        return other
-
     def count_rotations_from(self, reference: Any) -> None:
         """Count rotations from a reference (`rotfem.structures.reference_rotation`), None for the undeformed structure.
 
@@ -187,7 +174,7 @@ class System(Solutions, ABC):
         return False
 
     def leave_out(self, effects: Collection[str]) -> None:
-        """Switch effects off, all others on; of twins each has its own switched off."""
+        """Switch effects off, all others on."""
         self.left_out = frozenset(effects)
         self.model.switch_off(self.left_out)
         self.by_mode = None if EFFECT in effects else self._by_mode
