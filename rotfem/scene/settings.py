@@ -40,7 +40,7 @@ Elements = Annotated[
 Integration = Literal["reduced", "full"]
 
 
-_LADDER = 'it went with version 0.9; "accuracy" chooses theory, mesh and steps, "rotfem explain" compares theories'
+_LADDER = 'it went with version 0.9; "accuracy" chooses mesh and steps, "rotfem explain" the cheapest theory'
 _REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
 
 
