@@ -217,11 +217,11 @@ def test_hinge_in_the_inertial_frame(stiffness: float, damping: float) -> None:
         "structure": {**PLANAR, "section": {**SOFT, "EA": 1e7, "GA": 1e7}, "hub_radius": 1.0, "root": root},
         "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0, "axis": [0, 0, -1]},
         "mesh": {"elements": 4},
-        "time": {"end": 1.5, "step": 0.0025, "scheme": "esdirk4"},
+        "time": {"end": 1.5, "step": 0.00125, "scheme": "esdirk4"},
         "loads": {"gravity": [0.0, -9.81, 0.0], "tip_force": [0.0, 2.0, 0.0]},
         "output": {"error": False},
     }
     turning, fixed = (rotfem.run({**tables, "model": {"frame": f}}).history for f in ("rotating", "inertial"))
     for name in ("tip_u1", "tip_u2", "tip_alpha", "kinetic", "strain", "jacobi", "root_m3"):
         scale = max(np.abs(turning[name]).max(), 1e-3)
-        np.testing.assert_allclose(fixed[name], turning[name], atol=1e-6 * scale, err_msg=name)
+        np.testing.assert_allclose(fixed[name], turning[name], atol=1e-5 * scale, err_msg=name)
