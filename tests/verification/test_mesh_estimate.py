@@ -53,7 +53,7 @@ def plate(length: float) -> dict[str, Any]:
     ],
 )
 def test_order_of_the_error(structure: dict[str, Any], coarse: Any, fine: Any, count: int) -> None:
-    """Above 1e-5 (what the fine mesh leaves) it is at least half of the error, and at most 2^{2k} times it below 5 %."""
+    """Above 1e-5 (what the fine mesh leaves) it is half of the error or more, and at most 2^{2k} times it below 5 %."""
     true = result(structure, fine, count + 2)
     exact = dict(zip(true.labels, true.frequencies, strict=True))
     rows = [row for row in result(structure, coarse, count).rows if row["label"] in exact]
