@@ -68,7 +68,7 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
         (("--budget", "soon"), 'cost --budget = "soon": must be a time greater than 0, such as 60s'),
         (("--of", "campbell", "--set", "motion.speed=0.0"), "the scene has no speed to go up to"),
         (("--theories", "linear", "--set", "model.frame=inertial"), 'cost --theories = "linear"'),
-        (("--write", "no/where.toml"), '--write = "no/where.toml": nothing can be written in no'),
+        (("--write", "no/where.toml"), '--write = "no/where.toml": there is no folder no'),
         (("--write", "results"), '--write = "results": is a folder'),
     ],
 )

@@ -37,7 +37,7 @@ NUMBERS = [
     ("steady_state", 0.145349355577063, 1e-12),  # m: sin(kL)/(k cos kL) − L at 100 rad/s
     # rad/s: Legendre–Ritz with 22 functions a field, without shear and stretch, which make −1.9e-5
     ("pretwisted_blade", 11.8603317, 5e-5),
-    ("work_precision", 0.033, 0.03),  # Legendre–Galerkin histories of both theories: 0.032757 at 7 s
+    ("work_precision", 0.032757, 0.03),  # Legendre–Galerkin histories of both theories: 0.032757 at 7 s
     ("dropped_effects", 12.7404784, 1e-6),  # %: Legendre–Galerkin, 4.8570240429/4.30814567538 − 1
     ("explain", 0.01433888, 1e-5),  # Legendre–Galerkin frequencies, 1 − 46.9538176323/47.636876692
     # m: the beam's; Green's strains make 1.2e-5, the step of 0.01 s −8e-6

@@ -92,7 +92,7 @@ def columns_of(result: Any) -> Columns:
     for table in ("history", "shape", "resultants"):
         out |= {f"{table}.{name}": np.asarray(values) for name, values in getattr(result, table, {}).items()}
     if getattr(result, "stations", None) is not None:
-        out |= {f"stations.{name}": np.asarray(values) for name, values in result.stations.columns().items()}
+        out |= {f"stations.{name}": np.asarray(values) for name, values in result.stations.values.items()}
     # Which speeds a diagram inserts may be a matter of round-off: a mode that rests has a vector of nothing else.
     rows = [row for row in getattr(result, "rows", []) if not row.get("refined")]
     for name in rows[0] if rows else ():
