@@ -133,6 +133,12 @@ REFUSALS = (
         "A steady state has no steps, so no checkpoints.",
     ),
     Refusal(
+        {"command": ("run",), "time": ("accuracy",), "checkpoint": ("resumed",)},
+        r"--(checkpoint|resume): cannot be combined with accuracy",
+        "docs/results.md",
+        "A run to an `accuracy` takes several answers, and has none either.",
+    ),
+    Refusal(
         {"command": ("run",), "time": ("steady",), "loads": ("gravity",), "motion": but("motion", "rest")},
         r"loads\.gravity.*gravity across the spin axis turns",
         "docs/theory.md",
