@@ -213,12 +213,12 @@ class ModalAnalysis:
         system: Any = None,
     ):
         started = perf_counter()
-        self.problem, self.about, self.comm = problem.replace(frame="rotating"), about, comm
+        self.problem, self.about, self.comm = problem.replace(frame=problem.frame if problem.frame == "fixed" else "rotating"), about, comm
         self.system: Any = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None
-        self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) else None
+        self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) and problem.frame != 'fixed' else None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)

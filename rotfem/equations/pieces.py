@@ -259,6 +259,8 @@ class Pieces:
         """Return the components of a constant that may be nonzero: w and dw are along the axis if nothing pitches."""
         if name == "loads":
             return [entry for load in self.structure.load_constants for entry in self._entries(load)]
+        if name == "supports":
+            return [entry for matrix in self.model.frame.of_supports for entry in self._entries(matrix)]
         n = self.constants[name].value.size
         if name in ("w", "dw") and self.model.motion.pitch is None:
             return [(name, i) for i, c in enumerate(self.axis) if c != 0.0]

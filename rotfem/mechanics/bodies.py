@@ -147,28 +147,39 @@ class RootSpring(Moved):
     drift: Any = 0
 
 
+def _half(a: Any, b: Any, sign: int = 1) -> Any:
+    """Return (a ± b)/2, the number 0 where both are."""
+    return 0 if isinstance(a, int) and isinstance(b, int) else (a + sign * b) / 2
+
+
 @dataclass(frozen=True)
 class Support(Moved):
-    """A spring and a damper between a section of a shaft and the fixed frame, the same in all directions across it.
+    """A spring and a damper across the axis of a beam, in the frame: forces −K x − D ẋ, or moments of turns x.
 
     Attributes:
-        x: displacement across the axis as an expression of q, three frame components (m).
-        stiffness: k and the cross-coupling c of [[k, c], [−c, k]] (N/m), constants or 0.
-        damping: likewise (N·s/m).
-        axis: direction 1 of the shaft, about which the matrices turn y towards z.
+        x: displacement (m) or turn (rad) across the axis as an expression of q, components along directions 2 and 3.
+        stiffness: K, rows of two (N/m, N·m/rad), constants or 0.
+        damping: D likewise (N·s/m, N·m·s/rad).
         measure: UFL measure of its place.
+        at_rest: whether it stands in the fixed frame, also where the frame rotates.
     """
 
     x: Any
-    stiffness: tuple[Any, Any]
-    damping: tuple[Any, Any]
-    axis: Any
+    stiffness: Any
+    damping: Any
     measure: Any
+    at_rest: bool = True
 
-    def times(self, coefficients: tuple[Any, Any], v: Any) -> Any:
-        """Return [[a, b], [−b, a]] v of a vector across the axis, a v − b e×v."""
-        a, b = coefficients
-        return a * v - b * ufl.cross(self.axis, v)
+    def symmetric(self) -> Any:
+        """Return the rows of the symmetric part of K."""
+        (a, b), (c, d) = self.stiffness
+        return ((a, _half(b, c)), (_half(b, c), d))
+
+    def skew(self) -> Any:
+        """Return the rows of the skew part of K, by which a support may feed energy to a whirl."""
+        (_, b), (c, _) = self.stiffness
+        half = _half(b, c, -1)
+        return ((0, half), (-half, 0))
 
 
 @dataclass(frozen=True)

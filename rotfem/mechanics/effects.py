@@ -187,15 +187,16 @@ for _effect in (
         _work("supports"),
         lambda problem: bool(supports_of(problem)),
         ("a shaft has supports", "no supports"),
-        (),
+        ("supports",),
         passive=True,
         potential=_work("potential_of_supports"),
     ),
     Effect(
         "support_dampers",
         _work("support_dampers"),
-        lambda problem: any(np.any(s.damping) or s.isotropic[0][1] != 0.0 for s in supports_of(problem)),
+        lambda problem: any(np.any(s.damping) or s.stiffness[0][1] != s.stiffness[1][0] for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
+        ("supports",),
     ),
     Effect(
         "trapeze",

@@ -86,7 +86,7 @@ class Problem:
             kinds = ", ".join(self.theory.strains)
             why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
             raise InputError("model.theory", self.theory.name, why)
-        if self.frame not in ("rotating", "inertial"):
+        if self.frame not in ("rotating", "inertial", "fixed"):
             raise InputError("model.frame", self.frame, "allowed: rotating, inertial")
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
@@ -108,7 +108,7 @@ class Problem:
 
     def effective_effects(self) -> tuple[str, ...]:
         """Return the names of the effects that are in the equations: wanted, and with data."""
-        there = (e for e in Effect.registry if self.frame == "rotating" or not e.of_rotation)
+        there = (e for e in Effect.registry if self.frame != "inertial" or not e.of_rotation)
         names = (e.name for e in there if e.present(self))
         return tuple(name for name in names if self.effects is None or name in self.effects)
 

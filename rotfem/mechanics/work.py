@@ -58,11 +58,13 @@ class Frame:
         fixed: bool = False,
         gravity: npt.ArrayLike = (0, 0, 0),
         pitching: bool = False,
+        spun: bool = False,
     ):
-        self._domain, self.planar, self.fixed, self.pitching = domain, planar, fixed, pitching
+        self._domain, self.planar, self.fixed, self.pitching, self.spun = domain, planar, fixed, pitching, spun
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
         self._entries: dict[str, Array] = {}  # of the constants, where they are
+        self.of_supports: dict[str, Array] = {}
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
         self.slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
         self.slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2)) | {"psi": slice(0, 1)}
@@ -110,6 +112,9 @@ class Frame:
         out: dict[str, Array] = {}
         moved = motion.frame(t)
         for name in self.constants:
+            if name in self.of_supports:
+                out[name] = self.of_supports[name]
+                continue
             if name == "gravity":
                 value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
             elif name == "psi":
@@ -118,6 +123,26 @@ class Frame:
                 value = motion.rotation(t) @ moved[name] if self.fixed and name == "a_o" else moved[name]
             out[name] = value[self.slices[name]]
         return out
+
+    def matrix(self, name: str, given: Any) -> Any:
+        """Return the rows of a 2×2 matrix of a support, constants in one of the frame, and numbers 0 where it has them.
+
+        Args:
+            name: of the constant, which has the entries that are not zero.
+            given: ((yy, yz), (zy, zz)); one number where it is that times the identity.
+        """
+        A = np.asarray(given, dtype=float)
+        if A[0, 0] == A[1, 1] and A[0, 1] == A[1, 0] == 0.0:
+            if A[0, 0] == 0.0:
+                return ((0, 0), (0, 0))
+            self.of_supports[name] = A[0, :1]
+            k = self._constant(name, 1)[0]
+            return ((k, 0), (0, k))
+        there = np.flatnonzero(A.ravel())
+        self.of_supports[name] = A.ravel()[there]
+        c, entries = self._constant(name, len(there)), iter(range(len(there)))
+        flat = [c[next(entries)] if x != 0.0 else 0 for x in A.ravel()]
+        return (tuple(flat[:2]), tuple(flat[2:]))
 
     def set(self, values: dict[str, Array]) -> None:
         """Write values (from `values`) into the constants."""
@@ -182,8 +207,33 @@ class Mechanics:
     structure: Any
 
     def carried(self, body: Body) -> Any:
-        """Return w×x, the velocity of a point that rests in the frame, in the axes of the body."""
-        return cross(body.resolve(self.frame.w), body.x)
+        """Return the velocity by the spin, in the axes of the body: w×x, of a shaft in the fixed frame that of directors."""
+        if not self.frame.spun:
+            return cross(body.resolve(self.frame.w), body.x)
+        return ufl.zero(3) if body.is_position else cross(self.frame.w, body.x)
+
+    def in_rotor(self) -> Kinematics:
+        """Return the unknown with its rates seen from the rotor: of a shaft in the fixed frame q̇ − w×q.
+
+        Strains of a section that is the same in all directions turn with the shaft: Γ(R q) = R Γ(q).
+        """
+        if not self.frame.spun:
+            return self.k
+        q, v, a, dq = self.k.functions
+        turned = (0, -q[2], q[1], 0, -q[5], q[4])
+        return Kinematics(q, v - self.frame.w[0] * ufl.as_vector(turned), a, dq)
+
+    def gyroscopic(self, body: Body) -> Any:
+        """Return 2 w×ẋ; of a director d of a shaft in the fixed frame, which turns at ω + w in its axes, 2 ω×(w×d)."""
+        if not self.frame.spun:
+            return 2 * cross(body.resolve(self.frame.w), body.rate(self.k))
+        return None if body.is_position else 2 * cross(body.turn.spin(self.k), cross(self.frame.w, body.x))
+
+    def euler(self, body: Body) -> Any:
+        """Return ẇ×x; of a shaft in the fixed frame that of directors."""
+        if not self.frame.spun:
+            return cross(body.resolve(self.frame.dw), body.x)
+        return None if body.is_position else cross(self.frame.dw, body.x)
 
     def velocity(self, body: Body) -> Any:
         """Return ẋ + w×x (ẋ in a frame that does not rotate), the origin's apart, in the axes of the body."""
@@ -231,9 +281,9 @@ def _work_of(law: str, acceleration: Callable[[Mechanics, Body], Any]) -> Callab
 
 
 inertia = _work_of("ẍ, the acceleration relative to the frame", lambda m, b: b.second_rate(m.k))
-coriolis = _work_of("2 w×ẋ", lambda m, b: 2 * cross(b.resolve(m.frame.w), b.rate(m.k)))
-centrifugal = _work_of("w×(w×x)", lambda m, b: cross(b.resolve(m.frame.w), m.carried(b)))
-euler = _work_of("ẇ×x", lambda m, b: cross(b.resolve(m.frame.dw), b.x))
+coriolis = _work_of("2 w×ẋ", lambda m, b: m.gyroscopic(b))
+centrifugal = _work_of("w×(w×x)", lambda m, b: None if m.frame.spun else cross(b.resolve(m.frame.w), m.carried(b)))
+euler = _work_of("ẇ×x", lambda m, b: m.euler(b))
 base = _work_of("a_o, felt by positions only", lambda m, b: m.frame.a_o if b.is_position else None)
 gravity = _work_of("−g, felt by positions only", lambda m, b: -m.frame.gravity if b.is_position else None)
 
@@ -250,7 +300,9 @@ def damping(m: Mechanics, delta: Variation) -> Any:
     their own work.
     """
     work: list[Any] = []
-    k, eta, a0 = m.k, m.damping.stiffness, m.damping.mass
+    eta, a0 = m.damping.stiffness, m.damping.mass
+    m = replace(m, k=m.in_rotor())
+    k = m.k
     if eta is not None:
         work += [ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains]
     if a0 is not None:
@@ -269,19 +321,28 @@ def root_dampers(m: Mechanics, delta: Variation) -> Any:
     return added(s.damping * (m.k.rate(s.x) + s.drift) * delta.of(s) * s.measure for s in m.springs())
 
 
+def _product(rows: Any, x: Any, delta: Any) -> Any:
+    """Return δ·A x of two components, entries of A that are the number 0 left out."""
+    return added(
+        a * x[j] * delta[i] for i, row in enumerate(rows) for j, a in enumerate(row) if not isinstance(a, int)
+    )
+
+
 def supports(m: Mechanics, delta: Any) -> Any:
-    """Return Σ k x·δx over the displacements x of a shaft in its supports."""
-    return added(s.stiffness[0] * ufl.inner(s.x, delta.of(s)) * s.measure for s in m.structure.supports())
+    """Return Σ K x·δx of displacements or turns x of a beam in its supports, K the symmetric part of their stiffness."""
+    return added(_product(s.symmetric(), s.x, delta.of(s)) * s.measure for s in m.structure.supports(m.frame))
 
 
 def support_dampers(m: Mechanics, delta: Any) -> Any:
-    """Return Σ (D (ẋ + w×x) + c-part of K x)·δx: their forces of rates in the fixed frame, and the circulatory ones."""
+    """Return Σ (D ẋ + K x)·δx, D their damping, K the skew part of their stiffness, ẋ in the frame that they stand in."""
     work = []
-    for s in m.structure.supports():
-        rate = m.k.rate(s.x) + cross(m.frame.w, s.x)
-        force = s.times(s.damping, rate) + s.times((0, s.stiffness[1]), s.x)
-        work.append(ufl.inner(force, delta.of(s)) * s.measure)
-    return added(work)
+    for s in m.structure.supports(m.frame):
+        rate, omega = m.k.rate(s.x), m.frame.w[0] if s.at_rest and not m.frame.spun else 0
+        if not isinstance(omega, int):
+            rate += omega * ufl.as_vector((-s.x[1], s.x[0]))
+        for rows, x in ((s.damping, rate), (s.skew(), s.x)):
+            work.append(_product(rows, x, delta.of(s)) * s.measure)
+    return added(w for w in work if not isinstance(w, int))
 
 
 def loads(m: Mechanics, delta: Any) -> Any:

@@ -312,23 +312,16 @@ class SpatialBeam(Beam):
         """Turns in hinges; of the root of a driven shaft all that is across its axis."""
         return {1, 2, 4, 5} if self.data.root.driven else super().released
 
-    def supports(self) -> list[Support]:
-        """Return the bearings of a shaft, which is along direction 1, by their isotropic parts."""
-        across, e = ufl.as_vector((0, self.k.q[1], self.k.q[2])), ufl.as_vector((1, 0, 0))
-
-        def constants(name: str, pair: tuple[float, float]) -> tuple[Any, Any]:
-            return tuple(self.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in enumerate(pair))  # type: ignore[return-value]
-
-        return [
-            Support(
-                across,
-                constants(f"supports_{i}_stiffness", support.isotropic[0]),
-                constants(f"supports_{i}_damping", support.isotropic[1]),
-                e,
-                self.points.measure((support.x,)),
+    def supports(self, frame: Any) -> list[Support]:
+        """Return the supports, across direction 1."""
+        moves = ufl.as_vector([self.k.q[i] for i in (1, 2)])
+        out = []
+        for i, support in enumerate(self.data.supports):
+            K, D = (
+                frame.matrix(f"supports_{i}_{name}", getattr(support, name)) for name in ("stiffness", "damping")
             )
-            for i, support in enumerate(self.data.supports)
-        ]
+            out.append(Support(moves, K, D, self.points.measure((support.x,))))
+        return out
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""

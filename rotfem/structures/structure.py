@@ -229,7 +229,7 @@ class Structure(Loaded):
         """Return what holds the hinges; none here."""
         return []
 
-    def supports(self) -> list[Support]:
+    def supports(self, frame: Any) -> list[Support]:
         """Return the supports between the structure and the fixed frame; none here."""
         return []
 
