@@ -24,7 +24,6 @@ import ufl
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotropic_supports
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import massed
@@ -92,7 +91,7 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
     if spinning.pencil.spectrum_error is not None:
         out["spectrum"] = spinning.pencil.spectrum_error
     # A linear system's residual is made of these very matrices.
-    if not analysis.system.linear and analysis.fixed is None:
+    if not analysis.system.linear:
         out["linearisation"] = linearisation_error(analysis, spinning)
     return out
 
@@ -195,7 +194,6 @@ class ModalAnalysis:
     Attributes:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
-        fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
         estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
@@ -213,12 +211,14 @@ class ModalAnalysis:
         system: Any = None,
     ):
         started = perf_counter()
-        self.problem, self.about, self.comm = problem.replace(frame=problem.frame if problem.frame == "fixed" else "rotating"), about, comm
+        #: Whether modes are those in the fixed frame.
+        self.fixed = problem.frame == "fixed"
+        self.problem = problem if self.fixed else problem.replace(frame="rotating")
+        self.about, self.comm = about, comm
         self.system: Any = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None
-        self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) and problem.frame != 'fixed' else None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)
@@ -285,8 +285,6 @@ class ModalAnalysis:
     def _pencils(self, speed: float, keep: bool) -> tuple[Pencil, Pencil]:
         """Return the pencil at the state and speed (rad/s) that are set, and the same with the hub held."""
         matrices = self.system.mass_damping_stiffness(keep)
-        if self.fixed is not None:
-            matrices = self.fixed(matrices, speed)
         clamped = Pencil(*matrices)
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         clamped.unit = pencil.unit = self._unit
@@ -322,7 +320,6 @@ class ModalAnalysis:
         Raises:
             InputError: the hub is free, or a support differs by direction.
         """
-        check_rotating(self.problem, what)
         if self.free:
             raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 
@@ -407,7 +404,7 @@ class Described:
             wave = self._structure.wave(*self._structure.nodes(x), axis)
             if wave is None:
                 return []
-            found.append(wave if self._analysis.fixed is None else replace(wave, fixed=True))
+            found.append(replace(wave, fixed=self._analysis.fixed))
         return found
 
     @cached_property

@@ -43,7 +43,7 @@ def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> Re
 
     It is possible of a linear theory in the rotating frame with a fixed hub.
     """
-    if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
+    if not analysis.system.linear or analysis.free or analysis.fixed or len(speeds) < MANY:
         return None
     reduced = ReducedAnalysis(analysis)
     return reduced if reduced.prepare(speeds[0], speeds[-1], count) else None

@@ -29,7 +29,6 @@ from rotfem.accuracy.explain import (
 from rotfem.accuracy.explain import explain as explain_change
 from rotfem.accuracy.outputs import tip
 from rotfem.analysis.equilibrium import check_steady, steady_state
-from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import State
@@ -83,7 +82,6 @@ def explain(
     scene = as_scene(scene)
     with input_of(scene.file):
         of = Explanation(scene, terms or {}, comm)
-        check_rotating(of.problem, "explain")
         return of.result(check, progress or (lambda share: None))
 
 

@@ -31,7 +31,7 @@ def mode_tables(
     rigid = int(found.rigid)
     spinning = found.first(count - rigid)
     rows = mode_rows(analysis, spinning)
-    synchronous = critical(rows, speed, analysis.fixed is not None)
+    synchronous = critical(rows, speed, analysis.fixed)
     warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)

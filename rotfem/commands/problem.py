@@ -13,7 +13,6 @@ from mpi4py import MPI
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.first_motion import FirstMotion
-from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
@@ -232,7 +231,6 @@ class Problem(ProblemData):
         scheme = scheme or scheme_of(time)
         if tolerance is not None and not estimates_error(type(scheme)):
             raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
-        check_rotating(self, "a history")
         system = self.system(comm=comm)
         march = March(system, scheme, Steps.of(time), Newton(), first_shape(system, start))
         return (Moment(system, state) for state in march)
@@ -252,7 +250,6 @@ class Problem(ProblemData):
         speed = self._speed(speed)
         still = self.replace(frame="rotating", motion=self.motion.at_speed(speed))
         check_steady(still)
-        check_rotating(still, "a steady state")
         system = still.system(moving=False, comm=comm)
         q = steady_state(system, speed, Newton())
         return Moment(system, State.at_rest(system, q))

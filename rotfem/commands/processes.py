@@ -102,7 +102,7 @@ def modal_summary(command: str, analysis: ModalAnalysis, scene: Scene, started: 
     return {
         **summary(command, scene, analysis.everyone, analysis.comm),
         "theory": analysis.problem.theory.name,
-        **({} if analysis.fixed is None else {"frame": "fixed"}),
+        "frame": "fixed" if analysis.fixed else "rotating",
         "about": "undeformed" if analysis.system.linear else analysis.about,
         "effects": list(analysis.model.effects),
         "dofs": space.index_map.size_global * space.index_map_bs,

@@ -17,7 +17,6 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.frequency_response import (
     FrequencyResponse,
     HarmonicOutput,
@@ -80,7 +79,6 @@ def response(
     scene, started = as_scene(scene).showing("frequency", high if low is None else low), perf_counter()
     with input_of(scene.file):
         problem = Problem.of(scene)
-        check_rotating(problem, "a response")
         problem = problem.replace(loads=swept_loads(scene, problem.motion))
         analysis = analysis_of(scene, problem, comm)
         speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)

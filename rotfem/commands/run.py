@@ -19,7 +19,6 @@ from rotfem.accuracy.answer import Answer, Answers, Setting
 from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
-from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
@@ -80,7 +79,6 @@ class Simulation:
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
-        check_rotating(problem, "a run")
         if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)

@@ -54,6 +54,10 @@ class Body(Moved):
         """Return ẍ relative to the frame."""
         return k.second_rate(self.x)
 
+    def spin(self, k: Kinematics) -> Any:
+        """Return the angular velocity ω relative to the frame of the section that a director is fixed in, its axes."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
 class Gain:

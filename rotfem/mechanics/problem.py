@@ -53,7 +53,8 @@ class Problem:
         theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
         loads: gravity and applied loads, as sums.
-        frame: "rotating", or "inertial" (translates with the hub, does not rotate).
+        frame: "rotating"; "fixed", the frame of a round shaft that spins about its own axis; or "inertial" (translates
+            with the hub, does not rotate). "auto" becomes "fixed" for such a shaft, else "rotating".
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
         outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.
         prestress: "axial" or "all", whose geometric stiffness the prestressed linear theories have; None for what is
@@ -67,7 +68,7 @@ class Problem:
     theory: Any = "reissner"
     effects: tuple[str, ...] | None = None
     loads: Loads = field(default_factory=Loads)
-    frame: str = "rotating"
+    frame: str = "auto"
     terms: Mapping[str, Work] = field(default_factory=dict)
     outputs: Mapping[str, Functional] = field(default_factory=dict)
     prestress: str | None = None
@@ -86,8 +87,13 @@ class Problem:
             kinds = ", ".join(self.theory.strains)
             why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
             raise InputError("model.theory", self.theory.name, why)
+        if self.frame == "auto":
+            object.__setattr__(self, "frame", "fixed" if self.is_shaft else "rotating")
         if self.frame not in ("rotating", "inertial", "fixed"):
-            raise InputError("model.frame", self.frame, "allowed: rotating, inertial")
+            raise InputError("model.frame", self.frame, "allowed: auto, rotating, inertial, fixed")
+        if self.frame == "fixed" and not self.is_shaft:
+            why = "needs a straight spatial_beam that spins about its own axis and is the same in all directions about it"
+            raise InputError("model.frame", self.frame, why)
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
         if self.frame == "inertial" and not flat_and_exact:
@@ -106,6 +112,11 @@ class Problem:
         """Return a variant with other values of some attributes."""
         return replace(self, **changes)
 
+    @property
+    def is_shaft(self) -> bool:
+        """Whether the structure is a round shaft, which spins about its own axis."""
+        return bool(abs(self.motion.axis[0]) == 1.0 and getattr(self.structure, "is_round", False))
+
     def effective_effects(self) -> tuple[str, ...]:
         """Return the names of the effects that are in the equations: wanted, and with data."""
         there = (e for e in Effect.registry if self.frame != "inertial" or not e.of_rotation)
@@ -115,6 +126,8 @@ class Problem:
     @property
     def gravity_turns(self) -> bool:
         """Whether gravity has a component across the spin axis, which turns in the rotating frame."""
+        if self.frame == "fixed":
+            return False
         g = np.array(self.loads.gravity)
         across = np.linalg.norm(np.cross(g, self.motion.axis)) > ALONG * np.linalg.norm(g)
         return bool(across and self.motion.is_spinning and "gravity" in self.effective_effects())

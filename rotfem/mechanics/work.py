@@ -227,7 +227,7 @@ class Mechanics:
         """Return 2 w×ẋ; of a director d of a shaft in the fixed frame, which turns at ω + w in its axes, 2 ω×(w×d)."""
         if not self.frame.spun:
             return 2 * cross(body.resolve(self.frame.w), body.rate(self.k))
-        return None if body.is_position else 2 * cross(body.turn.spin(self.k), cross(self.frame.w, body.x))
+        return None if body.is_position else 2 * cross(body.spin(self.k), cross(self.frame.w, body.x))
 
     def euler(self, body: Body) -> Any:
         """Return ẇ×x; of a shaft in the fixed frame that of directors."""

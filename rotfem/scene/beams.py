@@ -263,6 +263,24 @@ class SpatialBeamStructure(BeamStructure):
         return float(np.cos(self.precone)), 0.0, float(np.sin(self.precone))
 
     @property
+    def is_straight(self) -> bool:
+        """Whether its axis is along direction 1, from a root on that axis."""
+        return self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is straight, and stiffness and inertia are the same in all directions about it.
+
+        Masses beside the axis are unbalance, no asymmetry.
+        """
+        if not self.is_straight or self.hinges or self.pitches:
+            return False
+        places = np.union1d(self.section.knots, self.length)
+        places = np.union1d(places, (places[1:] + places[:-1]) / 2)
+        bodies = [self.tip_inertia_matrix, *(m.inertia_matrix for m in self.masses)]
+        return all(map(same_about_axis, (*self.section.at(places).values(), *bodies)))
+
+    @property
     def has_fibers(self) -> bool:
         """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0
@@ -301,16 +319,27 @@ class SpatialBeamStructure(BeamStructure):
 
     def _check_supports(self) -> None:
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
-        straight = self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
         for i, support in enumerate(self.supports):
             if not on_span(support.x, self.length):
                 raise problem(f"supports.{i}.x", support.x, f"must be from 0 to the length {self.length:g}")
-        if self.supports and not straight:
+        if self.supports and not self.is_straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
             raise problem("supports", None, why)
         springs = {s.x for s in self.supports if min(s.stiffness[0][0], s.stiffness[1][1]) > 0.0}
         if self.root.driven and len(springs) < 2:
             raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
+
+
+def same_about_axis(A: Array) -> bool:
+    """Return whether matrices (…, 3 n, 3 n) of vectors commute with turns about direction 1, but for round-off."""
+    turn = np.kron(np.eye(A.shape[-1] // 3), [[0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    size = np.sqrt(np.abs(np.einsum("...i,...j->...ij", *2 * [np.einsum("...ii->...i", A)])))
+    size = np.maximum(size, np.abs(turn) @ size @ np.abs(turn.T))
+    return bool(np.all(np.abs(A @ turn - turn @ A) <= ROUND * np.maximum(size, np.swapaxes(size, -1, -2))))
+
+
+#: Relative difference by directions up to which a shaft counts as round.
+ROUND = 1e-9
 
 
 if TYPE_CHECKING:

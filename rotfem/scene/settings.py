@@ -66,7 +66,7 @@ class Model(SceneModel):
 
     theory: Annotated[str, PlainValidator(lambda value: as_name(value, registry.theories))] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
-    frame: Literal["rotating", "inertial"] = "rotating"
+    frame: Literal["auto", "rotating", "inertial", "fixed"] = "auto"
     prestress: Literal["axial", "all"] | None = None
     all_unknowns: StrictBool = False
 

@@ -124,6 +124,10 @@ class SectionBody(Body):
         """Return T δθ×d, or δr + Λ (T δθ×d)."""
         return self._moved(k.variation, self.turn.variation(k, self.arm))
 
+    def spin(self, k: Kinematics) -> Any:
+        """Return ω = T θ̇."""
+        return self.turn.spin(k)
+
     def _moved(self, change: Callable[[Any], Any], of_arm: Any) -> Any:
         return of_arm if self.axis is None else change(self.axis) + self.turn.rotate(of_arm)
 
