@@ -131,7 +131,7 @@ def _table(deck: Deck) -> tuple[Array, dict[str, Array], int]:
     first = head + 2  # below the units
     table = deck.table(first, count, names, POSITIVE)
     x = table.pop(names[0])
-    deck.increasing(x, first, 1.0, names[0])
+    deck.increasing(x, range(first, first + count), 1.0, names[0])
     for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
         deck.fail(
             "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read", first + int(i), 3
