@@ -131,7 +131,7 @@ BAD = r"""
 elastodyn.dat length rigid | 3.000000e+08 => 3.0x8 | line 14, column 5: "3.0x8" must be a finite
 elastodyn.dat length rigid | 3.000000e+08 => -3e8 | line 14, column 5: FlpStff must be greater than 0
 elastodyn.dat length rigid | 1.000000 0.25 => 0.900000 0.25 | line 15, column 1: BlFract must end at 1
-elastodyn.dat length rigid | EdgStff\n => EdgeStff\n | line 12, column 6: the column "EdgeStff" is not
+elastodyn.dat length rigid | EdgStff\n => EdgeStff\n | line 12, column 6: the column "EdgeStff" is not known
 elastodyn.dat length rigid |   2   NBl =>   3   NBl | line 16: has 5 columns; must be 6
 elastodyn.dat length rigid | AdjBlMs => AdjMass | no line with a value of AdjBlMs
 elastodyn.dat rigid |  | is a part of TipRad − HubRad
@@ -144,10 +144,10 @@ beamdyn.dat length | 5.0000 => 5.0, | must be a finite number
 beamdyn.dat length | 2   station => two   station | line 4, column 1: station_total is "two"
 beamdyn.dat |  | BeamDyn's primary file has the line
 bmodes.dat length stiff | 2  n_secs => 1  n_secs | line 2, column 1: n_secs
-bmodes.dat length stiff | tc_offst => te_offst | line 4: columns must be sec_loc str_tw
+bmodes.dat length stiff | tc_offst => te_offst | line 4, column 13: the column "te_offst" is not known
 bmodes.dat length stiff | 3.000000000000e+02 => 0.0 | line 6, column 4: mass_den must be greater
 bmodes.dat length stiff | 1.000000000000e+00 => 0.5 | line 7, column 1: sec_loc must end at 1
-bmodes.dat length stiff | 1.200000000000e+01  1.2 => 1.2e+01  1.3 | line 6, column 3: tw_iner must be
+bmodes.dat length stiff | 1.200000000000e+01  1.2 => 1.2e+01  1.3 | line 6: tw_iner must be
 bmodes.dat length |  | structure.section: must have GA2, GA3
 full.st | $1 2 => $1 3 | line 8: has 0 columns; must be 30
 full.st | $1 2 => $1 1 | line 5, column 2: must have at least two rows, not 1

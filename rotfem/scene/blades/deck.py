@@ -145,6 +145,33 @@ class Deck:
                 self.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
         return table
 
+    def columns(
+        self,
+        words: str,
+        count: int,
+        places: str,
+        known: Collection[str],
+        needed: Sequence[str],
+        positive: Sequence[str],
+    ) -> tuple[Array, dict[str, Array], int]:
+        """Return the places of stations, parts of the length, the columns there by name, and their first line.
+
+        They stand below the line of their names, in which `words` are, and the line of units; the places come first.
+        """
+        head = self.find(words)
+        right = {name.lower(): name for name in known}
+        first, *names = [right.get(word.lower(), word) for word in self.lines[head - 1].split()]
+        for column, name in enumerate(names, start=2):
+            if name not in known or name in names[: column - 2]:
+                why = f'the column "{name}" is not known, or stands twice; known: {", ".join(known)}'
+                self.fail(why, head, column)
+        if first not in places.split() or not set(needed) <= set(names):
+            self.fail(f"the columns must be {places.replace(' ', ' or ')}, {', '.join(needed)}", head)
+        table = self.table(head + 2, count, [first, *names], positive)
+        x = table.pop(first)
+        self.increasing(x, range(head + 2, head + 2 + count), 1.0, first)
+        return x, table, head + 2
+
     def hub_and_length(self, hub: str, tip: str) -> tuple[float, float]:
         """Return the radius of the hub and the length beyond it (m) of lines `value  name …`."""
         inner, outer = self.number(hub), self.number(tip)

@@ -34,8 +34,8 @@ from rotfem.scene.blades.deck import (
 )
 from rotfem.scene.values import DIGITS, ROUND_OFF, Array, is_positive
 
-#: Columns of ElastoDyn's blade file that must be there.
-NEEDED = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff")
+#: Columns of ElastoDyn's blade file that must be there, after BlFract.
+NEEDED = ("StrcTwst", "BMassDen", "FlpStff", "EdgStff")
 
 #: Those that may be there ↦ the property of a section; they are taken where all their values are greater than 0.
 TAKEN = {"GJStff": "GJ", "EAStff": "EA", "FlpIner": "rotary_inertia2", "EdgIner": "rotary_inertia3"}
@@ -43,8 +43,8 @@ TAKEN = {"GJStff": "GJ", "EAStff": "EA", "FlpIner": "rotary_inertia2", "EdgIner"
 #: Those that are left out. Of offsets the signs are not documented, and ElastoDyn computes without them.
 LEFT_OUT = ("Alpha", "PrecrvRef", "PreswpRef", "FlpcgOf", "EdgcgOf", "FlpEAOf", "EdgEAOf")
 
-#: Those that the motion does not depend on.
-PASSED_OVER = ("PitchAxis", "AeroCent")
+#: All that are known, with those that the motion does not depend on.
+KNOWN = (*NEEDED, *TAKEN, *LEFT_OUT, "PitchAxis", "AeroCent")
 
 
 # --- OpenFAST's main file -----------------------------------------------------------------------------------------
@@ -111,9 +111,7 @@ def _blade(deck: Deck, asked: Asked, length: float | None = None) -> dict[str, A
     """Return section, pretwist and damping of a blade file; the scene has other stiffness, and a length (m) of None."""
     count = deck.count("NBlInpSt", 2)
     factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
-    head = deck.find("BlFract BMassDen")
-    table = _columns(deck, head, count)
-    x = table["BlFract"]
+    x, table, _ = deck.columns("BlFract BMassDen", count, "BlFract", KNOWN, NEEDED, NEEDED[1:])
     taken = {key: table[name] for name, key in TAKEN.items() if name in table and np.all(table[name] > 0.0)}
     without = [key for key in ("EA", "GA2", "GA3", "GJ") if key not in taken]
     asked.needs(deck, tuple(without), "blades of ElastoDyn do not stretch, shear or twist")
@@ -137,22 +135,6 @@ def _blade(deck: Deck, asked: Asked, length: float | None = None) -> dict[str, A
     if given := {family: found for family, found in ratios.items() if any(found)}:
         keys["damping"] = {"modal": given}
     return keys
-
-
-def _columns(deck: Deck, head: int, count: int) -> dict[str, Array]:
-    """Return the columns (count,) of a blade file below the line of their names, and of the units."""
-    known = {name.lower(): name for name in (*NEEDED, *TAKEN, *LEFT_OUT, *PASSED_OVER)}
-    names = [known.get(word.lower(), word) for word in deck.lines[head - 1].split()]
-    for column, name in enumerate(names, start=1):
-        if name not in known.values() or name in names[: column - 1]:
-            allowed = ", ".join(known.values())
-            deck.fail(f'the column "{name}" is not known, or stands twice; known: {allowed}', head, column)
-    if missing := [name for name in NEEDED if name not in names]:
-        deck.fail(f"the columns {', '.join(missing)} are missing", head)
-    first = head + 2
-    table = deck.table(first, count, names, NEEDED[2:])
-    deck.increasing(table["BlFract"], range(first, first + count), 1.0, "BlFract")
-    return table
 
 
 # --- BeamDyn ------------------------------------------------------------------------------------------------------
