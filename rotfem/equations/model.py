@@ -94,7 +94,9 @@ class Model:
         self.motion: Motion = problem.motion if self.hub is None else self.hub.motion
         self.structure: Structure = build(problem, comm)
         fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
-        self.frame = Frame(self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching, problem.frame == "fixed")
+        self.frame = Frame(
+            self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching, problem.frame == "fixed"
+        )
         self.switches: dict[str, fem.Constant] = {}
         self._switched_off: frozenset[str] = frozenset()
         chosen = [Effect.registry[name] for name in self.effects]

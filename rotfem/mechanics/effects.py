@@ -11,8 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from rotfem.mechanics.pitch import is_beside
 from rotfem.registry import Registry, damping_models, register, resolved
 from rotfem.registry import effects as registered
@@ -194,7 +192,7 @@ for _effect in (
     Effect(
         "support_dampers",
         _work("support_dampers"),
-        lambda problem: any(np.any(s.damping) or s.stiffness[0][1] != s.stiffness[1][0] for s in supports_of(problem)),
+        lambda problem: any(s.feeds for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
         ("supports",),
     ),

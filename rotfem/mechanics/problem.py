@@ -91,8 +91,12 @@ class Problem:
             object.__setattr__(self, "frame", "fixed" if self.is_shaft else "rotating")
         if self.frame not in ("rotating", "inertial", "fixed"):
             raise InputError("model.frame", self.frame, "allowed: auto, rotating, inertial, fixed")
+        if self.frame == "rotating":
+            self._check_supports()
         if self.frame == "fixed" and not self.is_shaft:
-            why = "needs a straight spatial_beam that spins about its own axis and is the same in all directions about it"
+            why = (
+                "needs a straight spatial_beam that spins about its own axis and is the same in all directions about it"
+            )
             raise InputError("model.frame", self.frame, why)
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
@@ -111,6 +115,16 @@ class Problem:
     def replace(self, **changes: Any) -> Self:
         """Return a variant with other values of some attributes."""
         return replace(self, **changes)
+
+    def _check_supports(self) -> None:
+        """Refuse bearings that differ by direction where the shaft does, too: coefficients are periodic in any frame."""
+        standing = [s for s in getattr(self.structure, "supports", ()) if s.frame != "rotating"]
+        if abs(self.motion.axis[0]) == 1.0 and self.motion.is_spinning and not all(s.isotropic for s in standing):
+            why = (
+                "differ by direction, and so does the shaft: its equations have periodic coefficients in every frame, "
+                "which are not solved here; make bearings or shaft the same in all directions"
+            )
+            raise InputError("structure.supports", None, why)
 
     @property
     def is_shaft(self) -> bool:

@@ -49,6 +49,8 @@ class Frame:
     Attributes:
         constants: name ↦ constant in the forms.
         slices: name ↦ which components of a vector of the frame it has.
+        of_supports: name ↦ (speed, frequency of whirl) in rad/s ↦ entries of a coefficient of supports.
+        whirl: that frequency; None where it is the speed, as of an unbalance.
     """
 
     def __init__(
@@ -64,7 +66,8 @@ class Frame:
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
         self._entries: dict[str, Array] = {}  # of the constants, where they are
-        self.of_supports: dict[str, Array] = {}
+        self.of_supports: dict[str, Callable[[float, float], Array]] = {}
+        self.whirl: float | None = None
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
         self.slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
         self.slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2)) | {"psi": slice(0, 1)}
@@ -113,7 +116,8 @@ class Frame:
         moved = motion.frame(t)
         for name in self.constants:
             if name in self.of_supports:
-                out[name] = self.of_supports[name]
+                speed = motion.speed(t)
+                out[name] = self.of_supports[name](speed, speed if self.whirl is None else self.whirl)
                 continue
             if name == "gravity":
                 value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
@@ -124,25 +128,24 @@ class Frame:
             out[name] = value[self.slices[name]]
         return out
 
-    def matrix(self, name: str, given: Any) -> Any:
-        """Return the rows of a 2×2 matrix of a support, constants in one of the frame, and numbers 0 where it has them.
+    def coefficients(self, name: str, given: Any) -> Any:
+        """Return the rows of a 2×2 matrix of a support: entries of a constant, numbers 0 where they always vanish.
 
         Args:
-            name: of the constant, which has the entries that are not zero.
-            given: ((yy, yz), (zy, zz)); one number where it is that times the identity.
+            name: of the constant, which has the entries that do not vanish, one where it is that times the identity.
+            given: the matrix, or what gives it `at` a speed and a frequency of whirl (rad/s), with all its `rows`.
         """
-        A = np.asarray(given, dtype=float)
-        if A[0, 0] == A[1, 1] and A[0, 1] == A[1, 0] == 0.0:
-            if A[0, 0] == 0.0:
-                return ((0, 0), (0, 0))
-            self.of_supports[name] = A[0, :1]
-            k = self._constant(name, 1)[0]
-            return ((k, 0), (0, k))
-        there = np.flatnonzero(A.ravel())
-        self.of_supports[name] = A.ravel()[there]
-        c, entries = self._constant(name, len(there)), iter(range(len(there)))
-        flat = [c[next(entries)] if x != 0.0 else 0 for x in A.ravel()]
-        return (tuple(flat[:2]), tuple(flat[2:]))
+        at = getattr(given, "at", lambda speed, frequency: np.array(given))
+        all_of = np.reshape(getattr(given, "rows", [given]), (-1, 4))
+        there = np.flatnonzero(np.any(all_of != 0.0, axis=0))
+        if not len(there):
+            return ((0, 0), (0, 0))
+        scalar = list(there) == [0, 3] and bool(np.all(all_of[:, 0] == all_of[:, 3]))
+        entries = there[:1] if scalar else there
+        self.of_supports[name] = lambda speed, frequency: at(speed, frequency).ravel()[entries]
+        c = self._constant(name, len(entries))
+        a, b, d, e = (c[0 if scalar else int(np.searchsorted(there, i))] if i in there else 0 for i in range(4))
+        return ((a, b), (d, e))
 
     def set(self, values: dict[str, Array]) -> None:
         """Write values (from `values`) into the constants."""
@@ -323,18 +326,16 @@ def root_dampers(m: Mechanics, delta: Variation) -> Any:
 
 def _product(rows: Any, x: Any, delta: Any) -> Any:
     """Return δ·A x of two components, entries of A that are the number 0 left out."""
-    return added(
-        a * x[j] * delta[i] for i, row in enumerate(rows) for j, a in enumerate(row) if not isinstance(a, int)
-    )
+    return added(a * x[j] * delta[i] for i, row in enumerate(rows) for j, a in enumerate(row) if not isinstance(a, int))
 
 
 def supports(m: Mechanics, delta: Any) -> Any:
-    """Return Σ K x·δx of displacements or turns x of a beam in its supports, K the symmetric part of their stiffness."""
+    """Return Σ K x·δx of displacements or turns x of a beam in its supports, K the symmetric part of stiffness."""
     return added(_product(s.symmetric(), s.x, delta.of(s)) * s.measure for s in m.structure.supports(m.frame))
 
 
 def support_dampers(m: Mechanics, delta: Any) -> Any:
-    """Return Σ (D ẋ + K x)·δx, D their damping, K the skew part of their stiffness, ẋ in the frame that they stand in."""
+    """Return Σ (D ẋ + K x)·δx, K the skew part of stiffness, ẋ in the frame that supports stand in."""
     work = []
     for s in m.structure.supports(m.frame):
         rate, omega = m.k.rate(s.x), m.frame.w[0] if s.at_rest and not m.frame.spun else 0

@@ -15,9 +15,10 @@ from rotfem.scene.blades.deck import Asked, keys_of
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Hinge, Root, SpatialRoot, SupportTable
+from rotfem.scene.root import Hinge, Root, SpatialRoot
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
+from rotfem.scene.supports import SupportTable
 from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
     DIGITS,
@@ -28,11 +29,12 @@ from rotfem.scene.values import (
     Number,
     PaddedVector,
     Positive,
-    Profile,
     Rows,
     Span,
+    Tapered,
     Vector,
     check_profile_length,
+    check_start,
     on_span,
     symmetric,
 )
@@ -109,8 +111,8 @@ class BeamStructure(StructureTable):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """Places (m) of masses."""
-        return apart([body.x for body in self.masses], self.length)
+        """Places (m) of masses, and of steps of the section."""
+        return apart([*(body.x for body in self.masses), *self.section.steps], self.length)
 
     @property
     def hinges(self) -> dict[int, Hinge]:
@@ -214,7 +216,7 @@ class SpatialBeamStructure(BeamStructure):
     tip_inertia: Inertia = 0.0
     tip_offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
     section: SpatialSection
-    pretwist: Annotated[Profile[Number], along("rad")] = 0.0
+    pretwist: Annotated[Tapered[Number], AfterValidator(check_start), along("rad")] = 0.0
     sweep: Annotated[Span[Number], AfterValidator(_check_sweep), along("rad")] = 0.0
     line: Line | None = None
     precone: Annotated[Number, unit("rad")] = 0.0
@@ -325,7 +327,7 @@ class SpatialBeamStructure(BeamStructure):
         if self.supports and not self.is_straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
             raise problem("supports", None, why)
-        springs = {s.x for s in self.supports if min(s.stiffness[0][0], s.stiffness[1][1]) > 0.0}
+        springs = {s.x for s in self.supports if s.holds}
         if self.root.driven and len(springs) < 2:
             raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
 

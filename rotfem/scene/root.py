@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, NamedTuple, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
-import numpy as np
-from pydantic import BeforeValidator, Field, StrictBool
+from pydantic import Field, StrictBool
 
 from rotfem.scene.loads import Given, Harmonic, TimeFunction
 from rotfem.scene.table import SceneModel, problem, unit
-from rotfem.scene.values import Matrix, NonNegative, Number, TimeTable
+from rotfem.scene.values import NonNegative, Number, TimeTable
 
 
 class HarmonicAngle(Harmonic):
@@ -109,6 +108,7 @@ class SpatialRoot(Root):
         pitch_damping: against their rate (N·m·s/rad).
         pitch: angle that the whole blade is turned by about its axis at the root (rad), a number or over time.
         driven: whether the drive constrains a shaft along and about its axis alone; `supports` carry the rest.
+        free: components that nothing holds at the root: u1 leaves thrust free, theta1 torsion.
     """
 
     AXES: ClassVar[dict[str, int]] = {"pitch": 1, "flap": 2, "lag": 3}
@@ -119,60 +119,25 @@ class SpatialRoot(Root):
     pitch_damping: Damper = 0.0
     pitch: PitchAngle = Field(default_factory=lambda: cast(Any, 0.0), validate_default=True)
     driven: StrictBool = False
+    free: tuple[Literal["u1", "u2", "u3", "theta1", "theta2", "theta3"], ...] = ()
+
+    @property
+    def released(self) -> set[int]:
+        """Numbers of the components that the root leaves free, 0 to 5, but for the turns of its hinges."""
+        names = ("u1", "u2", "u3", "theta1", "theta2", "theta3")
+        return {names.index(name) for name in self.free} | ({1, 2, 4, 5} if self.driven else set())
 
     def check(self, precone: float) -> None:
         """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid.
 
         And springs of a root that a drive leaves free.
         """
-        if self.driven and (self.hinges or self.pitch.changes):
+        if self.released and (self.hinges or self.pitch.changes):
             why = "leaves the root free to turn, without hinges and a pitch over time; structure.supports hold it"
-            raise problem("root.driven", self.driven, why)
+            raise problem("root.driven" if self.driven else "root.free", None, why)
         pairs = [(1, 3, "a precone")] if precone != 0.0 else []
         for first, second, what in [*pairs, (2, 3, "a pitch over time")] if self.pitch.changes else pairs:
             if (first in self.hinges) != (second in self.hinges):
                 missing = next(name for name, axis in self.AXES.items() if axis in {first, second} - self.hinges.keys())
                 why = f"must be given too with {what}, which turns the axes of both; a large number holds it"
                 raise problem(f"root.{missing}_stiffness", None, why)
-
-
-def _isotropic(value: Any) -> Any:
-    """Return that times the identity of a number."""
-    return value if isinstance(value, list | tuple) else ((value, 0.0), (0.0, value))
-
-
-#: yy and zz are at least 0; a number stands for that times the identity.
-TwoByTwo = Annotated[tuple[tuple[NonNegative, Number], tuple[Number, NonNegative]], BeforeValidator(_isotropic)]
-
-
-class SupportTable(SceneModel):
-    """A bearing of a shaft: a spring and a damper between a section and the fixed frame, across the axis of spin.
-
-    Forces along directions 2 and 3 of the fixed frame are −stiffness · (y, z) − damping · (ẏ, ż).
-
-    Attributes:
-        x: place along the beam (m).
-        stiffness: of the spring (N/m), a number or [[yy, yz], [zy, zz]].
-        damping: of the damper (N·s/m), likewise.
-    """
-
-    x: Annotated[Number, unit("m")]
-    stiffness: Annotated[TwoByTwo, unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
-    damping: Annotated[TwoByTwo, unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
-
-    def _check(self) -> None:
-        if not np.any(self.stiffness) and not np.any(self.damping):
-            raise problem("stiffness", None, "give stiffness, damping, or both")
-
-    @property
-    def isotropic(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """(a, b) of the part [[a, b], [−b, a]] of stiffness and damping, which every rotating frame sees alike."""
-        (k, c), (d, e) = ((A[0][0] + A[1][1], A[0][1] - A[1][0]) for A in (self.stiffness, self.damping))
-        return (k / 2, c / 2), (d / 2, e / 2)
-
-    @property
-    def anisotropic(self) -> tuple[Matrix, Matrix]:
-        """The rest of both, [[a, b], [b, −a]]: how they differ by direction."""
-        rest = [((A[0][0] - A[1][1]) / 2, (A[0][1] + A[1][0]) / 2) for A in (self.stiffness, self.damping)]
-        stiffness, damping = (((a, b), (b, -a)) for a, b in rest)
-        return stiffness, damping

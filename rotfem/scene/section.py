@@ -43,8 +43,8 @@ from rotfem.scene.values import (
     Rows,
     ShearCorrection,
     T,
-    check_increasing,
     check_start,
+    check_steps,
     evaluate,
     is_table,
     symmetric,
@@ -63,7 +63,7 @@ Point = tuple[Number, Number]
 OverSpan = Annotated[
     Annotated[T, Tag("<one>")] | Annotated[tuple[tuple[Number, T], ...], Tag("<rows>")],
     Discriminator(lambda value: "<rows>" if is_table(value) else "<one>"),
-    AfterValidator(lambda value: check_start(check_increasing(value)) if is_table(value) else value),
+    AfterValidator(lambda value: check_start(check_steps(value)) if is_table(value) else value),
 ]
 
 
@@ -113,7 +113,7 @@ class Section(SceneModel):
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ()
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Annotated[Profile[Positive], along("m")] | None]
+    __pydantic_extra__: dict[str, Annotated[Profile[NonNegative], along("m")] | None]
 
     E: Annotated[Profile[Positive], along("Pa")] | None = None
     nu: PoissonProfile | None = None
@@ -159,6 +159,12 @@ class Section(SceneModel):
         """Places of all rows of tapers (m), and the root."""
         return sorted({0.0, *(x for taper in self.tapers.values() for x, _ in taper)})
 
+    @property
+    def steps(self) -> list[float]:
+        """Places (m) at which a table has two rows of one x."""
+        tables = ([x for x, _ in taper] for taper in self.tapers.values())
+        return sorted({x for places in tables for x in places if places.count(x) > 1})
+
     def profile(self, name: str, x: npt.ArrayLike) -> Array:
         """Return the profile of a key at places x (m) along the beam, zeros where it is not given."""
         return evaluate(getattr(self, name) or 0.0, x)
@@ -197,6 +203,9 @@ class Section(SceneModel):
         if self.way.name == "shape":
             # All dimensions are linear between knots, so it is enough to look at the knots.
             dimensions = self._dimensions(np.array(self.knots))
+            for key in dimensions.keys() - {*registry.shapes[str(self.shape)].may_vanish}:
+                if np.min(dimensions[key]) <= 0.0 or any(row[1] <= 0.0 for row in self.tapers.get(key, ())):
+                    raise problem(key, self.given[key], "must be greater than 0")
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
             for name, values in asdict(self._geometry(np.array(self.knots))).items():

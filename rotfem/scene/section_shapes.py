@@ -58,6 +58,7 @@ class Shape:
         geometry: (nu, **dimensions) ↦ properties; ν and the dimensions are arrays over positions along the beam.
         alternatives: further complete sets of keys, any of which may be given instead of `dimensions`.
         check: dimensions ↦ what is allowed, by name of those that are not; called with their values at all knots.
+        may_vanish: dimensions that may be 0.
     """
 
     registry: ClassVar[Registry[Shape]] = registered
@@ -67,6 +68,7 @@ class Shape:
     geometry: Callable[..., Geometry]
     alternatives: tuple[tuple[str, ...], ...] = ()
     check: Callable[..., dict[str, str]] = lambda **dimensions: {}
+    may_vanish: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         choices: tuple[Any, ...] = self.choices
@@ -131,6 +133,6 @@ def _hole_fits(outer_radius: Array, **hole: Array) -> dict[str, str]:
 for _shape in (
     Shape("rectangle", ("width", "height"), rectangle),
     Shape("circle", ("radius",), circle),
-    Shape("tube", ("outer_radius", "inner_radius"), tube, (("outer_radius", "wall"),), _hole_fits),
+    Shape("tube", ("outer_radius", "inner_radius"), tube, (("outer_radius", "wall"),), _hole_fits, ("inner_radius",)),
 ):
     register(_shape)

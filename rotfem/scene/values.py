@@ -68,6 +68,20 @@ def check_increasing(rows: Any) -> Any:
     return rows
 
 
+def check_steps(rows: Any) -> Any:
+    """Return rows of a section over the span: x does not decrease, and two rows of one x between the ends are a step."""
+    if isinstance(rows, float):
+        return rows
+    x = [row[0] for row in rows]
+    if len(x) < 2 or x[0] == x[1] or x[-2] == x[-1]:
+        raise problem("", None, "must have at least two rows, the first two and the last two of different x")
+    for i, (before, after) in enumerate(pairwise(x), start=2):
+        if after < before or x.count(after) > 2:
+            why = "x must not decrease; two rows of one x are a step, and no more than two"
+            raise problem("", None, f"{why}; row {i}: {after:g} after {before:g}")
+    return rows
+
+
 def check_start(rows: Any) -> Any:
     """Return a profile; refuse one that is a taper which does not start at x = 0."""
     if isinstance(rows, tuple) and rows[0][0] != 0.0:
@@ -81,8 +95,8 @@ Span = Annotated[
 ]
 #: A number, or a taper ((x, value), …), x (m) strictly increasing.
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
-#: The same from x = 0.
-Profile = Annotated[Tapered[T], AfterValidator(check_start)]
+#: A number, or a taper from x = 0, in which two rows of one x are a step.
+Profile = Annotated[Span[T], AfterValidator(check_steps), AfterValidator(check_start)]
 #: Rows (t, value), t (s) strictly increasing.
 TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_increasing)]
 

@@ -144,15 +144,26 @@ class Beam(Structure):
 
             self.section[name] = self.profile(name, values)
 
+    def beside(self, x: Array, near: Array) -> Array:
+        """Return places x (m) of the span, those at a step of the section moved towards others, near them."""
+        for step in self.data.section.steps:
+            here = np.abs(x - step) < ONE * self.length
+            x = np.where(here, step + np.sign(near - step) * 1e-2 * ONE * self.length, x)
+        return x
+
     def profile(self, name: str, at: Callable[[Array], Array], valid: Valid | None = not_negative) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""
         if self._section.uniform:
             return self.constant(at(np.zeros(1))[0])
-        return self.field(name, lambda x, _: at(x), 4, valid=valid)  # that of I where dimensions taper
+        return self.field(
+            name, lambda x, near: at(self.beside(x, near)), 4, valid=valid
+        )  # that of I where dimensions taper
 
     def linear_field(self, name: str, at: Callable[[Array], Array], size: int, valid: Valid | None = None) -> Any:
         """Return the field of at(X), (n, size), that is linear between rows; of values (n,) where the size is 0."""
-        return self.field(name, lambda x, _: at(x), self.degree if len(self.inner_rows) else 1, size, valid)
+        return self.field(
+            name, lambda x, near: at(self.beside(x, near)), self.degree if len(self.inner_rows) else 1, size, valid
+        )
 
     def field(
         self, name: str, at: Callable[[Array, Array], Any], degree: int, size: int = 0, valid: Valid | None = None

@@ -208,7 +208,7 @@ class SpatialBeam(Beam):
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
             return False
-        if any(b != 0.0 for support in data.supports for _, b in support.isotropic):
+        if any(support.couples for support in data.supports):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
@@ -314,17 +314,17 @@ class SpatialBeam(Beam):
     @property
     def released(self) -> set[int]:
         """Turns in hinges; of the root of a driven shaft all that is across its axis."""
-        return {1, 2, 4, 5} if self.data.root.driven else super().released
+        return self.data.root.released or super().released
 
     def supports(self, frame: Any) -> list[Support]:
-        """Return the supports, across direction 1."""
-        moves = ufl.as_vector([self.k.q[i] for i in (1, 2)])
-        out = []
+        """Return the supports, across direction 1: of displacements, and of turns."""
+        out, q = [], self.k.q
         for i, support in enumerate(self.data.supports):
-            K, D = (
-                frame.matrix(f"supports_{i}_{name}", getattr(support, name)) for name in ("stiffness", "damping")
-            )
-            out.append(Support(moves, K, D, self.points.measure((support.x,))))
+            at, rotating = self.points.measure((support.x,)), support.frame == "rotating"
+            for kind, x in (("", (q[1], q[2])), ("tilt_", (q[4], q[5]))):
+                names = [f"{kind}stiffness", f"{kind}damping"]
+                K, D = (frame.coefficients(f"supports_{i}_{name}", getattr(support, name)) for name in names)
+                out.append(Support(ufl.as_vector(x), K, D, at, not rotating))
         return out
 
     def root_turn(self, axis: int) -> Any:
