@@ -22,7 +22,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     nonlinear theories (see `NonlinearSystem`).
     """
     view = View()
-    seen, signals = viewed(problem, view) if moving else (problem, [])
+    seen, signals = viewed(problem.pushed(), view) if moving else (problem, [])
     model = Model(seen, comm)
     system: Any
     if problem.theory.linear and moving:  # its pieces are held apart, 12 kB for each unknown of a plate

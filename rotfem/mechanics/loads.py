@@ -255,18 +255,20 @@ class Loads:
         gravity: acceleration, m/s², inertial axes.
         named: name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment".
         places: of the loads "at.0", "at.1", …: (x,) along a beam (m), or (x, y) on a plate.
+        unbalance: tables of unbalances (`rotfem.mechanics.unbalance`).
     """
 
     gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
     named: Mapping[str, AnyLoad] = field(default_factory=dict)
     places: tuple[tuple[float, ...], ...] = ()
+    unbalance: tuple[Any, ...] = ()
     __repr__ = short_fields
 
     @classmethod
     def of(cls, given: Any, structure: Any, angle: Callable[[float], float]) -> Loads:
         """Return the loads that a scene or a script gives, as sums."""
         named = {name: load_of(f"loads.{name}", load, structure, angle, kind) for name, load, kind in given.named()}
-        return cls(given.gravity, named, tuple(point.x for point in given.at))
+        return cls(given.gravity, named, tuple(point.x for point in given.at), given.unbalance)
 
     @property
     def stations(self) -> set[float]:

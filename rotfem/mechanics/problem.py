@@ -14,6 +14,7 @@ from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
+from rotfem.mechanics.unbalance import Unbalance, pushed, unbalances
 from rotfem.registry import Registry
 from rotfem.registry import outputs as registered
 from rotfem.short import short_fields
@@ -115,6 +116,21 @@ class Problem:
     def replace(self, **changes: Any) -> Self:
         """Return a variant with other values of some attributes."""
         return replace(self, **changes)
+
+    @property
+    def unbalances(self) -> tuple[Unbalance, ...]:
+        """The unbalances of a shaft that are no part of its mass in the frame of the problem."""
+        if abs(self.motion.axis[0]) != 1.0 or not getattr(self.structure, "is_straight", False):
+            return ()
+        found = unbalances(self.structure, self.loads.unbalance)
+        return found if self.frame == "fixed" else found[len(found) - len(self.loads.unbalance) :]
+
+    def pushed(self) -> Self:
+        """Return the problem of a history, in which unbalances push."""
+        found = self.unbalances
+        if not found:
+            return self
+        return self.replace(loads=pushed(self.loads, found, self.motion, self.frame != "fixed"))
 
     def _check_supports(self) -> None:
         """Refuse bearings that differ by direction where the shaft does, too: coefficients are periodic in any frame."""

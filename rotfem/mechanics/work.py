@@ -49,7 +49,7 @@ class Frame:
     Attributes:
         constants: name ↦ constant in the forms.
         slices: name ↦ which components of a vector of the frame it has.
-        of_supports: name ↦ (speed, frequency of whirl) in rad/s ↦ entries of a coefficient of supports.
+        of_supports: name ↦ speed (rad/s) ↦ entries of a coefficient of supports.
         whirl: that frequency; None where it is the speed, as of an unbalance.
     """
 
@@ -66,7 +66,7 @@ class Frame:
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
         self._entries: dict[str, Array] = {}  # of the constants, where they are
-        self.of_supports: dict[str, Callable[[float, float], Array]] = {}
+        self.of_supports: dict[str, Callable[[float], Array]] = {}
         self.whirl: float | None = None
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
         self.slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
@@ -116,8 +116,7 @@ class Frame:
         moved = motion.frame(t)
         for name in self.constants:
             if name in self.of_supports:
-                speed = motion.speed(t)
-                out[name] = self.of_supports[name](speed, speed if self.whirl is None else self.whirl)
+                out[name] = self.of_supports[name](motion.speed(t))
                 continue
             if name == "gravity":
                 value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
@@ -135,17 +134,22 @@ class Frame:
             name: of the constant, which has the entries that do not vanish, one where it is that times the identity.
             given: the matrix, or what gives it `at` a speed and a frequency of whirl (rad/s), with all its `rows`.
         """
-        at = getattr(given, "at", lambda speed, frequency: np.array(given))
         all_of = np.reshape(getattr(given, "rows", [given]), (-1, 4))
         there = np.flatnonzero(np.any(all_of != 0.0, axis=0))
         if not len(there):
             return ((0, 0), (0, 0))
         scalar = list(there) == [0, 3] and bool(np.all(all_of[:, 0] == all_of[:, 3]))
         entries = there[:1] if scalar else there
-        self.of_supports[name] = lambda speed, frequency: at(speed, frequency).ravel()[entries]
+        self.of_supports[name] = lambda speed: self.coefficient(given, speed).ravel()[entries]
         c = self._constant(name, len(entries))
         a, b, d, e = (c[0 if scalar else int(np.searchsorted(there, i))] if i in there else 0 for i in range(4))
         return ((a, b), (d, e))
+
+    def coefficient(self, given: Any, speed: float) -> Array:
+        """Return a 2×2 matrix of a support at a speed (rad/s) and the frequency of whirl."""
+        if not hasattr(given, "at"):
+            return np.array(given)
+        return np.asarray(given.at(speed, speed if self.whirl is None else self.whirl))
 
     def set(self, values: dict[str, Array]) -> None:
         """Write values (from `values`) into the constants."""

@@ -356,6 +356,40 @@ class PointLoad(SceneModel):
             raise problem("force", None, "give force, moment, or both")
 
 
+class UnbalanceTable(SceneModel):
+    """One table of [[loads.unbalance]]: a mass beside the axis of a shaft, as mass times distance or as a grade.
+
+    Attributes:
+        x: place along the shaft (m).
+        kg_m: mass times its distance from the axis (kg·m), or None.
+        phase: its angle in the section, from direction 2 towards direction 3 (rad).
+        grade: balance quality G of ISO 21940-11 (mm/s), as 6.3, instead of kg_m: distance times service speed.
+        mass: that the grade is of (kg).
+        speed: service speed of the grade (rad/s).
+        start: time from which it is there (s), as after the loss of a blade, or None: always.
+    """
+
+    x: Annotated[Number, unit("m")]
+    kg_m: Annotated[Number, unit("kg*m")] | None = None
+    phase: Annotated[Number, unit("rad")] = 0.0
+    grade: Positive | None = None
+    mass: Annotated[Positive, unit("kg")] | None = None
+    speed: Annotated[Positive, unit("rad/s")] | None = None
+    start: Annotated[Number, unit("s")] | None = None
+
+    def _check(self) -> None:
+        of_grade = (self.grade, self.mass, self.speed)
+        if (self.kg_m is None) == (None in of_grade) or (self.kg_m is not None and any(of_grade)):
+            raise problem("kg_m", self.kg_m, "give kg_m, or grade, mass and speed")
+
+    @property
+    def moment(self) -> float:
+        """Mass times distance, kg·m."""
+        if self.grade is None or self.mass is None or self.speed is None:
+            return self.kg_m or 0.0
+        return self.mass * 1e-3 * self.grade / self.speed
+
+
 class LoadsTable(SceneModel):
     """The [loads] table.
 
@@ -367,6 +401,7 @@ class LoadsTable(SceneModel):
         distributed_moment: moment per length of a beam (N), or None.
         pressure: on a plate (N/m²), or None.
         at: forces and moments at places of the structure.
+        unbalance: masses beside the axis of a shaft.
     """
 
     gravity: Annotated[PaddedVector, unit("m/s**2")] = (0.0, 0.0, 0.0)
@@ -376,6 +411,7 @@ class LoadsTable(SceneModel):
     distributed_moment: SpanMoment | None = None
     pressure: Pressure | None = None
     at: tuple[PointLoad, ...] = ()
+    unbalance: tuple[UnbalanceTable, ...] = ()
 
     def named(self) -> Iterator[tuple[str, LoadTable, str]]:
         """Yield name, load and kind of all that are given: "tip_force", …, "at.0.force", "at.0.moment"."""
@@ -395,6 +431,12 @@ def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) 
     """Refuse loads that the structure cannot bear, and what a free hub or a scene without time does not have."""
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
+    for i, mass in enumerate(loads.unbalance):
+        if not getattr(structure, "is_straight", False):
+            raise problem(
+                f"loads.unbalance.{i}", None, "needs a shaft: a straight spatial_beam that spins about its axis"
+            )
+        check_place(f"loads.unbalance.{i}.x", structure, (mass.x,))
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load, _ in loads.named():
