@@ -31,7 +31,7 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.loads import Loads as GivenLoads
+from rotfem.scene.loads import LoadsTable
 from rotfem.scene.settings import estimates_error
 from rotfem.units import si
 from rotfem.users_functions import number_of
@@ -147,7 +147,7 @@ class Problem(ProblemData):
 
     def __post_init__(self) -> None:
         given: Any = self.loads
-        if isinstance(given, GivenLoads):
+        if isinstance(given, LoadsTable):
             made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
             object.__setattr__(self, "loads", made)
         super().__post_init__()
