@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from rotfem.commands.response import response as response
     from rotfem.commands.run import run as run
     from rotfem.commands.sweep import sweep as sweep
+    from rotfem.commands.unbalance import unbalance as unbalance
     from rotfem.mechanics.effects import DampingModel as DampingModel
     from rotfem.mechanics.effects import Effect as Effect
     from rotfem.mechanics.free_hub import FreeHub as FreeHub
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from rotfem.results.of_scene import ExplainResult as ExplainResult
     from rotfem.results.run import RunResult as RunResult
     from rotfem.results.sweep import SweepResult as SweepResult
+    from rotfem.results.unbalance import UnbalanceResult as UnbalanceResult
     from rotfem.scene import BeamMesh as BeamMesh
     from rotfem.scene import PlateMesh as PlateMesh
     from rotfem.scene import Scene as Scene

@@ -12,7 +12,6 @@ an ellipse made of a forward circle r_f = ½(y + i z) and a backward one r_b = �
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -95,7 +94,7 @@ class UnbalanceResponse:
         self.x = structure.nodes(self._system.zeros())[0]["x"]
 
     def at(self, speed: float) -> tuple[Complex, Complex]:
-        """Return displacements u₂, u₃ (m) at the nodes, (2, nodes), and the forces of the shaft on supports (N), (2, n).
+        """Return displacements u₂, u₃ (m) at the nodes, (2, nodes), and forces of the shaft on supports (N), (2, n).
 
         Args:
             speed: Ω, rad/s.
@@ -111,4 +110,4 @@ class UnbalanceResponse:
         for support, point in zip(analysis.structure.data.supports, self._at, strict=True):
             K_b, C_b = (frame.coefficient(c, speed) for c in (support.stiffness, support.damping))
             forces.append((K_b + 1j * speed * C_b) @ point(u)[self._across[:2]])
-        return nodes, np.array(forces).reshape(-1, 2).T
+        return nodes, np.array(forces, dtype=np.complex128).reshape(-1, 2).T

@@ -146,6 +146,29 @@ def response(
     todo.finish(result)
 
 
+@command(computes=False)
+def unbalance(
+    todo: Job,
+    speeds: Annotated[
+        str, typer.Option("--speeds", metavar="RANGE", help="first:last:number in rad/s, or as 0:12000:200rpm")
+    ],
+    probe: Annotated[
+        list[str] | None,
+        typer.Option("--probe", metavar="X:ANGLE", help="a probe: place (m) and angle (°), repeatable"),
+    ] = None,
+    operating: Annotated[
+        str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range: 3000:3600rpm")
+    ] = None,
+) -> None:
+    """Compute the unbalance response of a shaft, SCENE, over its speed."""
+    from rotfem.commands.unbalance import probe_of
+    from rotfem.commands.unbalance import unbalance as answers
+
+    marked = None if operating is None else speeds_of("--operating", operating, 2)
+    probes = [probe_of(text) for text in probe or ()]
+    todo.finish(answers(todo.scene, speeds, probes=probes, operating=marked, comm=todo.session.comm))
+
+
 def look(session: Session, path: Path, overrides: Sequence[str]) -> bool:
     """Say how the results of a folder ended, or, without FEniCSx, that a scene is valid; return whether either was."""
     if path.is_dir():

@@ -20,7 +20,7 @@ def report(result: Result) -> list[str]:
     tables = [line for table in result.tables() for line in table.lines()]
     before, after = _AROUND[s["command"]](s)
     known = s.get("scene", {}).get("output", {}).get("error", True)
-    unknown = [] if known else ["error: not estimated, as output.error = false"]
+    unknown = [] if known or s["command"] == "unbalance" else ["error: not estimated, as output.error = false"]
     return [*before, *shared(s), *tables, *(of_error(s) if "error" in s else unknown), *after]
 
 
@@ -101,6 +101,7 @@ _AROUND = {
     "modes": lambda s: ([about(s), effects(s), *accuracy_report(s)], []),
     "campbell": of_campbell,
     "response": lambda s: ([about(s), f"{s['frequencies']} frequencies of the load"], []),
+    "unbalance": lambda s: ([f"{s['name']}: {s['theory']} theory, fixed frame, {s['dofs']} unknowns", effects(s)], []),
     "explain": of_explain,
     "compare": lambda s: ([], [f"largest difference: {percent(s['worst'])}"]),
     "sweep": of_sweep,

@@ -133,7 +133,7 @@ class Problem:
         return self.replace(loads=pushed(self.loads, found, self.motion, self.frame != "fixed"))
 
     def _check_supports(self) -> None:
-        """Refuse bearings that differ by direction where the shaft does, too: coefficients are periodic in any frame."""
+        """Refuse bearings that differ by direction where the shaft does, too: periodic coefficients in any frame."""
         standing = [s for s in getattr(self.structure, "supports", ()) if s.frame != "rotating"]
         if abs(self.motion.axis[0]) == 1.0 and self.motion.is_spinning and not all(s.isotropic for s in standing):
             why = (

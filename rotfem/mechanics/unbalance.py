@@ -42,7 +42,7 @@ class Unbalance:
 
     @property
     def amplitude(self) -> npt.NDArray[np.complex128]:
-        """m e (e₂ − i e₃) e^{iβ}, components along directions 2 and 3, kg·m; of a spin about direction 1."""
+        """Amplitude m e (e₂ − i e₃) e^{iβ}, components along directions 2 and 3, kg·m; of a spin about direction 1."""
         return np.asarray(self.moment * np.exp(1j * self.phase) * np.array([1.0, -1.0j]))
 
     def load(self, motion: Motion, turning: bool) -> Load:

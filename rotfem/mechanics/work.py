@@ -214,7 +214,7 @@ class Mechanics:
     structure: Any
 
     def carried(self, body: Body) -> Any:
-        """Return the velocity by the spin, in the axes of the body: w×x, of a shaft in the fixed frame that of directors."""
+        """Return the velocity by the spin, in axes of the body: w×x; in the fixed frame only directors have it."""
         if not self.frame.spun:
             return cross(body.resolve(self.frame.w), body.x)
         return ufl.zero(3) if body.is_position else cross(self.frame.w, body.x)

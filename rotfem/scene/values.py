@@ -69,7 +69,7 @@ def check_increasing(rows: Any) -> Any:
 
 
 def check_steps(rows: Any) -> Any:
-    """Return rows of a section over the span: x does not decrease, and two rows of one x between the ends are a step."""
+    """Return rows of a section over the span, x not decreasing; two rows of one x between the ends are a step."""
     if isinstance(rows, float):
         return rows
     x = [row[0] for row in rows]

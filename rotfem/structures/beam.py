@@ -175,7 +175,7 @@ class Beam(Structure):
 
     # --- values -------------------------------------------------------------------------------------------------
 
-    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+    def nodes(self, values: npt.NDArray[Any]) -> tuple[dict[str, Array], npt.NDArray[Any]]:
         """Return ({"x": (n,) m, increasing}, q (n, components)) at all nodes, on every rank."""
         x, q = self.gather(values)
         return {"x": x[self._order, 0]}, q[self._order]

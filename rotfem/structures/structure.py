@@ -196,7 +196,7 @@ class Structure(Loaded):
         """Names of the unknowns of a node: of the active components."""
         return tuple(self.components[i] for i in self.active)
 
-    def whole_values(self, values: Array) -> Array:
+    def whole_values(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return all components of values (…, unknowns of a node), zeros for inactive ones."""
         if self.size == len(self.components):
             return values
@@ -310,7 +310,7 @@ class Structure(Loaded):
         nodes = self.V.dofmap.index_map.size_local + self.V.dofmap.index_map.num_ghosts
         return np.tile([self.length if name.startswith("u") else 1.0 for name in self.unknowns], nodes)
 
-    def gather(self, values: Array) -> tuple[Array, Array]:
+    def gather(self, values: npt.NDArray[Any]) -> tuple[Array, npt.NDArray[Any]]:
         """Return positions (n, 3) in m and values (n, components) of a local dof array at all nodes, on every rank."""
         owned = self.V.dofmap.index_map.size_local
         q = self.whole_values(values[: self.size * owned].reshape(-1, self.size))
@@ -322,7 +322,7 @@ class Structure(Loaded):
         x: Array = self.V.tabulate_dof_coordinates()[: self.V.dofmap.index_map.size_local]
         return x if self.comm.size == 1 else np.concatenate(self.comm.allgather(x))
 
-    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+    def nodes(self, values: npt.NDArray[Any]) -> tuple[dict[str, Array], npt.NDArray[Any]]:
         """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
         raise NotImplementedError
 

@@ -1,0 +1,190 @@
+"""`rotfem unbalance`: whirl of a shaft under its unbalances over the speed (see `rotfem.analysis.unbalance`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from scipy.optimize import brentq, minimize_scalar
+
+from rotfem.analysis.unbalance import Orbits, UnbalanceResponse
+from rotfem.commands.campbell import parse_speeds
+from rotfem.commands.modes import analysis_of
+from rotfem.commands.problem import Problem
+from rotfem.commands.processes import modal_summary
+from rotfem.errors import InputError, SceneError, input_of
+from rotfem.results.unbalance import UnbalanceResult
+from rotfem.scene import Scene, as_scene
+from rotfem.scene.values import on_span
+from rotfem.units import split_unit
+
+Array = npt.NDArray[Any]
+
+#: Part of a peak at whose height its width is read (API 617).
+HALF_POWER = np.sqrt(0.5)
+
+
+def unbalance(
+    scene: Scene | str | Path | Mapping[str, Any],
+    speeds: Sequence[float] | str,
+    *,
+    probes: Sequence[tuple[float, float]] = (),
+    operating: Sequence[float] | None = None,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> UnbalanceResult:
+    """Return amplitudes, phases, orbits and bearing forces of a shaft under its unbalances, over the speed.
+
+    Peaks are sought between the speeds. Their amplification factor is N_c/(N₂ − N₁), N₁ and N₂ the speeds at which the
+    larger semi-axis is 0.707 of that at the peak N_c; the separation margin is the distance of N_c from the operating
+    range, in parts of the nearer end of it (API 617, 8th edition, 1-2.6).
+
+    Args:
+        scene: scene, path of a scene file, or nested tables; its unbalances are `loads.unbalance` and masses beside
+            the axis.
+        speeds: rad/s, increasing, or a text "first:last:number" with a unit.
+        probes: pairs of a place (m) and an angle (rad) from direction 2 towards direction 3 that a probe looks along.
+        operating: lowest and highest operating speed (rad/s).
+        comm: MPI communicator; every rank gets the whole result.
+
+    Raises:
+        SceneError: the scene is not valid, is no round shaft, or has no unbalance.
+        ComputationError: no equilibrium.
+    """
+    shown = as_scene(scene).showing("speed", speeds)
+    asked, started = parse_speeds(speeds) if isinstance(speeds, str) else list(map(float, speeds)), perf_counter()
+    with input_of(shown.file):
+        problem = Problem.of(shown).spinning()
+        if problem.frame != "fixed":
+            why = "must be a round shaft that spins about its axis: straight, the same in all directions"
+            raise InputError("structure", None, f"{why}; its frame is {problem.frame}")
+        if not problem.unbalances:
+            raise InputError("loads.unbalance", None, "give one, or a mass with an offset across the axis")
+        for x, _ in probes:
+            if not on_span(x, shown.structure.length):
+                raise SceneError("command line", "--probe", x, f"must be from 0 to {shown.structure.length:g} m")
+        analysis = analysis_of(shown, problem, comm, False)
+        response = UnbalanceResponse(analysis, problem.unbalances)
+        places = sorted({*(u.x for u in problem.unbalances), *response.supports, *(x for x, _ in probes)})
+        answers = [response.at(speed) for speed in asked]
+        rows = [
+            row
+            for speed, answer in zip(asked, answers, strict=True)
+            for row in rows_of(response, speed, answer, places, probes)
+        ]
+        found = peaks_of(response, asked, answers, places, operating)
+        summary = {
+            **modal_summary("unbalance", analysis, shown, started),
+            "unbalances": [{"x": u.x, "kg_m": u.moment, "phase": u.phase} for u in problem.unbalances],
+            "places": places,
+            "probes": [{"x": x, "angle": angle} for x, angle in probes],
+            "operating": None if operating is None else list(operating),
+            "peaks": found,
+            "warnings": [*analysis.notes, *beyond(problem, asked)],
+            "advice": [],
+        }
+        return UnbalanceResult(summary, rows, np.array([shape for shape, _ in answers]), response.x)
+
+
+def rows_of(
+    response: UnbalanceResponse,
+    speed: float,
+    answer: tuple[Array, Array],
+    places: Sequence[float],
+    probes: Sequence[tuple[float, float]],
+) -> list[dict[str, Any]]:
+    """Return one row a place at a speed (see `rotfem.UnbalanceResult`)."""
+    shape, forces = answer
+    rows = []
+    for x in places:
+        y, z = (np.interp(x, response.x, part) for part in shape)
+        orbit = Orbits(y, z)
+        row: dict[str, Any] = {"speed": float(speed), "x": float(x)}
+        for name, value in (("u2", y), ("u3", z)):
+            row |= {name: float(abs(value)), f"{name}_phase": float(np.angle(value))}
+        row |= {name: float(getattr(orbit, name)) for name in ("major", "minor", "angle")}
+        for i in (i for i, support in enumerate(response.supports) if support == x):
+            for name, value in zip(("f2", "f3"), forces[:, i], strict=True):
+                row |= {name: float(abs(value)), f"{name}_phase": float(np.angle(value))}
+        for angle in (angle for place, angle in probes if place == x):
+            reading = orbit.along(angle)
+            row |= {"probe": float(abs(reading)), "probe_phase": float(np.angle(reading))}
+        rows.append(row)
+    return rows
+
+
+def peaks_of(
+    response: UnbalanceResponse,
+    speeds: Sequence[float],
+    answers: Sequence[tuple[Array, Array]],
+    places: Sequence[float],
+    operating: Sequence[float] | None,
+) -> list[dict[str, Any]]:
+    """Return the peaks of the larger semi-axis at every place, between the speeds."""
+
+    def major(speed: float, x: float) -> float:
+        shape, _ = response.at(float(speed))
+        return float(Orbits(*(np.interp(x, response.x, part) for part in shape)).major)
+
+    peaks = []
+    for x in places:
+        sizes = np.array([Orbits(*(np.interp(x, response.x, p) for p in shape)).major for shape, _ in answers])
+        for i in 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])):
+            between = (speeds[i - 1], speeds[i + 1])
+            top = minimize_scalar(
+                lambda s, x=x: -np.log(major(s, x)),
+                bounds=between,
+                method="bounded",
+                options={"xatol": 1e-6 * between[1]},
+            )
+            size, sides = float(np.exp(-top.fun)), []
+            for way in (-1, 1):
+                at, beyond_it = float(top.x), i + way
+                while 0 <= beyond_it < len(speeds) and sizes[beyond_it] > HALF_POWER * size:
+                    beyond_it += way
+                if 0 <= beyond_it < len(speeds):
+                    ends = sorted((at, speeds[beyond_it]))
+                    sides.append(brentq(lambda s, x=x, size=size: major(s, x) - HALF_POWER * size, *ends, rtol=1e-7))
+            amplification = float(top.x / (sides[1] - sides[0])) if len(sides) == 2 else None
+            peaks.append(
+                {
+                    "x": float(x),
+                    "speed": float(top.x),
+                    "major": size,
+                    "amplification": amplification,
+                    "margin": None if operating is None else margin(float(top.x), operating),
+                }
+            )
+    return peaks
+
+
+def margin(speed: float, operating: Sequence[float]) -> float:
+    """Return the distance of a speed from a range in parts of the nearer end of it; 0 within it."""
+    low, high = operating
+    return (low - speed) / low if speed < low else (speed - high) / high if speed > high else 0.0
+
+
+def beyond(problem: Problem, speeds: Sequence[float]) -> list[str]:
+    """Return warnings of coefficients of supports that are held constant outside of their tables."""
+    out = []
+    for i, support in enumerate(problem.structure.supports):
+        for name in ("stiffness", "damping", "tilt_stiffness", "tilt_damping"):
+            table = getattr(support, name)
+            of = [table.beyond(s) for s in (speeds[0], speeds[-1])] if hasattr(table, "beyond") else []
+            if any(of):
+                out.append(f"structure.supports.{i}.{name} is a table {max(of)}; beyond them it is held constant")
+    return out
+
+
+def probe_of(text: str) -> tuple[float, float]:
+    """Return place (m) and angle (rad) of a probe, from "x:angle", the angle in degrees or with a unit."""
+    try:
+        place, _, angle = text.partition(":")
+        number, unit = split_unit(angle or "0") if angle else ("0", 1.0)
+        return float(place), float(number) * (unit if unit != 1.0 else np.pi / 180)
+    except ValueError:
+        raise SceneError("command line", "--probe", text, "must be x:angle, in m and degrees") from None
