@@ -219,16 +219,32 @@ class Mechanics:
             return cross(body.resolve(self.frame.w), body.x)
         return ufl.zero(3) if body.is_position else cross(self.frame.w, body.x)
 
-    def in_rotor(self) -> Kinematics:
-        """Return the unknown with its rates seen from the rotor: of a shaft in the fixed frame q̇ − w×q.
+    def strain_rate(self, strain: Strain) -> Any:
+        """Return the rate of a strain seen from the structure: of a shaft in the fixed frame Γ̇ − w×Γ.
 
-        Strains of a section that is the same in all directions turn with the shaft: Γ(R q) = R Γ(q).
+        A section that is the same in all directions turns under its strains: those across the axis pass from one to the
+        other direction.
         """
+        rate = self.k.rate(strain.value)
         if not self.frame.spun:
-            return self.k
-        q, v, a, dq = self.k.functions
-        turned = (0, -q[2], q[1], 0, -q[5], q[4])
-        return Kinematics(q, v - self.frame.w[0] * ufl.as_vector(turned), a, dq)
+            return rate
+        omega, (kind, _, direction) = self.frame.w[0], strain.name.partition("_")
+        if strain.name == "section":
+            g = strain.value
+            return rate + omega * ufl.as_vector((g[1], -g[0], 0, g[4], -g[3]))
+        other = next((s for s in self.strains if s.name == f"{kind}_{5 - int(direction or 0)}"), None)
+        return rate if other is None else rate + (omega if direction == "2" else -omega) * other.value
+
+    def rate(self, body: Body) -> Any:
+        """Return ẋ seen from the structure: of a shaft in the fixed frame ẋ − w×x."""
+        if not self.frame.spun:
+            return body.rate(self.k)
+        w = self.frame.w
+        return (
+            body.rate(self.k) - cross(w, body.x)
+            if body.is_position
+            else body.rate(self.k) + cross(w - body.resolve(w), body.x)
+        )
 
     def gyroscopic(self, body: Body) -> Any:
         """Return 2 w×ẋ; of a director d of a shaft in the fixed frame, which turns at ω + w in its axes, 2 ω×(w×d)."""
@@ -308,12 +324,11 @@ def damping(m: Mechanics, delta: Variation) -> Any:
     """
     work: list[Any] = []
     eta, a0 = m.damping.stiffness, m.damping.mass
-    m = replace(m, k=m.in_rotor())
     k = m.k
     if eta is not None:
-        work += [ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains]
+        work += [ufl.inner(eta * s.force(m.strain_rate(s)), k.variation(s.value)) * s.measure for s in m.strains]
     if a0 is not None:
-        work += [a0 * b.density * ufl.inner(b.rate(k), delta.of(b)) * b.measure for b in m.bodies]
+        work += [a0 * b.density * ufl.inner(m.rate(b), delta.of(b)) * b.measure for b in m.bodies]
     work += [resolved(damping_models[name].work)(m, delta, c) for name, c in m.damping.models.items()]
     return added(work)
 

@@ -328,8 +328,12 @@ class SpatialBeamStructure(BeamStructure):
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
             raise problem("supports", None, why)
         springs = {s.x for s in self.supports if s.holds}
-        if self.root.driven and len(springs) < 2:
-            raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
+        if self.root.driven and not self.root.free and len(springs) < 2:
+            raise problem(
+                "root.driven",
+                True,
+                "needs structure.supports with a stiffness at two places at least, or root.free",
+            )
 
 
 def same_about_axis(A: Array) -> bool:
