@@ -28,12 +28,12 @@ from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotro
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import massed
-from rotfem.equations.nonlinear import assembled
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
+from rotfem.numerics.forms import assembled
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
@@ -61,7 +61,7 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
         and `effective_mass_1`, … (kg) along the directions of the frame in which the structure moves; and the mass
         (kg) by the same names of directions.
     """
-    system, names = analysis.system.held, list(analysis.structure.unknowns)
+    system, names = analysis.system, list(analysis.structure.unknowns)
     owned = system.V.dofmap.index_map.size_local * len(names)
     energy = kinetic_parts(system.model.mechanics)["T2"]()
     momentum = forms.form(ufl.derivative(energy, system.v, system.structure.k.dq))
@@ -104,7 +104,7 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
 
 def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
     """Return the relative difference between M, C, K times a vector and central differences of the residual."""
-    system, pencil = analysis.system.held, spinning.clamped
+    system, pencil = analysis.system, spinning.clamped
     zero = system.zeros()
     # A direction without structure: for a mode, K x is what is left when large axial terms cancel.
     system.q.x.array[:] = np.random.default_rng(1).standard_normal(zero.size) * system.scale
@@ -284,7 +284,7 @@ class ModalAnalysis:
         if not self.free:
             pairs = self.kept.better(pencil, pairs, count)
         for vectors in (pairs.right, pairs.left):
-            vectors[self.system.held.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
+            vectors[self.system.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": pencil.factored, "eigen": t3 - t2}
         for name, span in spans.items():
@@ -302,9 +302,8 @@ class ModalAnalysis:
 
     def pencils(self, speed: float, q: Array, keep: bool = True) -> tuple[Pencil, Pencil]:
         """Return the pencil about a state q (local dof array) at a speed (rad/s), and the same with the hub held."""
-        held = self.system.held
-        held.set_time(0.0, held.motion.at_speed(speed))
-        held.set_state(q)
+        self.system.set_time(0.0, self.system.motion.at_speed(speed))
+        self.system.set_state(q)
         matrices = self.system.mass_damping_stiffness(keep)
         if self.fixed is not None:
             matrices = self.fixed(matrices, speed)
@@ -342,7 +341,7 @@ class ModalAnalysis:
 
     def equilibrium(self, speed: float, start: Spinning | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
-        s = self.system.held
+        s = self.system
         if self.about == "undeformed" or s.linear:
             s.set_time(0.0, s.motion.at_speed(speed))
             s.set_state(zero := s.zeros())
@@ -402,7 +401,8 @@ class Described:
         axis = np.asarray(self._analysis.system.motion.axis) * (-1.0 if self._spinning.speed < 0.0 else 1.0)
         found = []
         for x in self._spinning.right.T:
-            wave = self._structure.wave(*self._structure.nodes(x), axis)
+            coordinates, values = self._structure.nodes(x)
+            wave = self._structure.wave(coordinates, values, axis)
             if wave is None:
                 return []
             found.append(wave if self._analysis.fixed is None else replace(wave, fixed=True))

@@ -15,9 +15,8 @@ from mpi4py import MPI
 from rotfem.commands.problem import Problem
 from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
-from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms
-from rotfem.numerics.forms import SAME_PATTERN, Assembler
+from rotfem.numerics.forms import SAME_PATTERN, Assembler, Functionals
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.root import SpatialRoot, Support
+from rotfem.scene.root import SpatialRoot, SupportTable
 from rotfem.structures.symmetry import inactive_unknowns
 
 pytestmark = pytest.mark.usefixtures("unestimated")
@@ -220,7 +220,7 @@ KNOWN = {
         *("pitch_damping", "pitch", "driven"),
     },
     PointMass: {"x", "mass", "offset", "inertia"},
-    Support: {"x", "stiffness", "damping"},
+    SupportTable: {"x", "stiffness", "damping"},
     PlateStructure: {
         *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),
         *("shear_correction", "hub_radius", "hub_offset", "point_masses", "line_masses", "damping"),

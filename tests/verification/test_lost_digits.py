@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rotfem import Problem, RunResult, run
-from rotfem.analysis.conditioning import conditioning
+from rotfem.analysis.equilibrium import conditioning
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 

@@ -16,8 +16,6 @@ from scipy.optimize import brentq
 
 from rotfem import ComputationError, run
 from rotfem.analysis.equilibrium import static_tip_shape
-from rotfem.analysis.march import check_root
-from rotfem.analysis.schemes import Stage
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.numerics import forms
@@ -151,11 +149,13 @@ def test_a_root_that_is_not_the_motions() -> None:
     system = compile_system(Problem.of(beam(1e3, 0.1)))
     system.set_time(0.0)
     zero = system.zeros()
-    check_root(system, Stage(0.02, zero, zero, zero, 1.0, 1.0))
+    system.set_state(zero)
+    system.check_inside_out()
     inside_out = zero.copy()
     inside_out[::3] = -2.0 * system.V.tabulate_dof_coordinates()[:, 0]
+    system.set_state(inside_out)
     with pytest.raises(ComputationError, match="inside out"):
-        check_root(system, Stage(0.02, inside_out, zero, zero, 1.0, 1.0))
+        system.check_inside_out()
 
 
 def test_a_beam_that_hardly_moves_is_not_inside_out() -> None:
