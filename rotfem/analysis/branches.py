@@ -30,7 +30,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.analysis.reduced_basis import SpeedModel, between, with_errors
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
-from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, repeated
 from rotfem.structures.mode_names import Wave
 
 Array = npt.NDArray[Any]
@@ -110,17 +110,6 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
     joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
     return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
-
-
-def repeated(values: Array, bounds: Array) -> list[list[int]]:
-    """Return the indices of eigenvalues (sorted by size) in groups of those that are one."""
-    sizes = np.abs(values)
-    off = bounds * sizes
-    one = np.abs(values[1:] - values[:-1]) <= np.maximum(EQUAL_EIGENVALUES * sizes[1:], off[1:] + off[:-1])
-    out = [[0]] if len(values) else []
-    for i, same in enumerate(one.tolist(), start=1):
-        out[-1].append(i) if same else out.append([i])
-    return out
 
 
 def assign(point: SpeedPoint, following: SpeedPoint) -> float:

@@ -31,7 +31,7 @@ from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil, repeated
 from rotfem.numerics.forms import assembled
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
@@ -283,6 +283,7 @@ class ModalAnalysis:
         self._unit = pencil.unit
         if not self.free:
             pairs = self.kept.better(pencil, pairs, count)
+        self.whirling(pencil, pairs, pairs.right, pairs.left)
         for vectors in (pairs.right, pairs.left):
             vectors[self.system.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
@@ -299,6 +300,31 @@ class ModalAnalysis:
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
         return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
+
+    def whirling(self, pencil: Pencil, pairs: Eigenpairs, right: Array, left: Array) -> None:
+        """Make the modes of one frequency of a round shaft that spins circular, forward and backward, in place.
+
+        They are eigenvectors of a turn about its axis, J u = e₁×u, which bearings without preferred directions allow.
+
+        Args:
+            pencil: of the full system.
+            pairs: the modes, whose vectors may be those of a model.
+            right: their right vectors in the full system.
+            left: their left ones.
+        """
+        if not self.fixed or not self.problem.motion.is_spinning:
+            return
+        size, names = len(self.structure.unknowns), list(self.structure.unknowns)
+        for group in (np.array(g) for g in repeated(pairs.values, pairs.bounds) if len(g) > 1):
+            X, Y, lam = right[:, group], left[:, group], pairs.values[group]
+            x, turned = X.reshape(-1, size, len(group)), np.zeros((len(X) // size, size, len(group)), dtype=complex)
+            for kind in ("u", "theta"):
+                i, j = names.index(f"{kind}2"), names.index(f"{kind}3")
+                turned[:, i], turned[:, j] = -x[:, j], x[:, i]
+            own = pencil.gram(Y, lam, X, lam)
+            V = np.linalg.eig(np.linalg.pinv(own) @ pencil.gram(Y, lam, turned.reshape(X.shape), lam))[1]
+            pairs.right[:, group] = pairs.right[:, group] @ V
+            pairs.left[:, group] = pairs.left[:, group] @ np.linalg.pinv(own @ V).conj().T
 
     def pencils(self, speed: float, q: Array, keep: bool = True) -> tuple[Pencil, Pencil]:
         """Return the pencil about a state q (local dof array) at a speed (rad/s), and the same with the hub held."""

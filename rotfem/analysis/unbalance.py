@@ -85,7 +85,7 @@ class UnbalanceResponse:
         sense = float(np.sign(analysis.problem.motion.axis[0]))
         self._force = np.zeros(V.dofmap.index_map.size_local * V.dofmap.index_map_bs, dtype=np.complex128)
         for u in found:
-            push = u.amplitude if sense > 0.0 else u.amplitude.conj() * np.exp(2j * u.phase)
+            push = u.amplitude if sense > 0.0 else u.amplitude.conj()
             weights = PointValues(V, np.array([u.x, 0.0, 0.0])).columns(len(self._force))
             self._force += weights[:, self._across[:2]] @ push
         self._force[self._system.clamped] = 0.0

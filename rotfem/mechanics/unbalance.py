@@ -32,13 +32,13 @@ class Unbalance:
         x: place along the shaft, m.
         moment: m e, kg·m.
         phase: β, rad, from direction 2 towards direction 3.
-        start: time from which it is there, s, as after the loss of a blade; None: always.
+        start: time after which it pushes, s, as after the loss of a blade; by default a history's begin.
     """
 
     x: float
     moment: float
     phase: float = 0.0
-    start: float | None = None
+    start: float = 0.0
 
     @property
     def amplitude(self) -> npt.NDArray[np.complex128]:
@@ -50,7 +50,7 @@ class Unbalance:
         sense = float(np.sign(motion.axis[0]))
 
         def force(t: float) -> tuple[float, float]:
-            if self.start is not None and t < self.start:
+            if t <= self.start:
                 return 0.0, 0.0
             angle = self.phase if turning else sense * motion.angle(t) + self.phase
             speed, rate = motion.speed(t) ** 2, sense * motion.rate(t)
@@ -58,8 +58,8 @@ class Unbalance:
             return self.moment * (speed * c + rate * s), self.moment * (speed * s - rate * c)
 
         both = Shapes.uniform([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        knots = (() if self.start is None else (self.start,)) + motion.sharp
-        term = Term(both, lambda times: np.array([force(float(t)) for t in times]), tuple(sorted(knots)), linear=False)
+        knots = tuple(sorted({self.start, *motion.sharp}))
+        term = Term(both, lambda times: np.array([force(float(t)) for t in times]), knots, linear=False)
         return Load("dead", (term,))
 
 

@@ -206,6 +206,17 @@ class Eigenpairs:
         return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
 
 
+def repeated(values: Array, bounds: Array) -> list[list[int]]:
+    """Return the indices of eigenvalues (sorted by size) in groups of those that are one."""
+    sizes = np.abs(values)
+    off = bounds * sizes
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(EQUAL_EIGENVALUES * sizes[1:], off[1:] + off[:-1])
+    out = [[0]] if len(values) else []
+    for i, same in enumerate(one.tolist(), start=1):
+        out[-1].append(i) if same else out.append([i])
+    return out
+
+
 def backward_errors(pencil: Pencil, values: Array, X: Array) -> Array:
     """Return the normwise backward errors of eigenpairs, ‖(λ² M + λ C + K) x‖ / [(|λ|² ‖M‖ + |λ| ‖C‖ + ‖K‖) ‖x‖]."""
     matrices, powers = (pencil.M, pencil.C, pencil.K), np.array([values**2, values, np.ones_like(values)])

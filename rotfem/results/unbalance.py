@@ -97,7 +97,7 @@ def bode_figure(result: UnbalanceResult) -> Figure:
     from rotfem.results.plots import panels_over
 
     units = ShownUnits.of(result.summary)
-    figure, (above, below) = panels_over(f"speed Ω ({units.speed})", 2, _title(result))
+    figure, (above, below) = panels_over(f"speed Ω ({units.speed})", 2, _title(result), beside=1.1)
     for c, x in enumerate(_places(result)):
         of = result.at(x)
         speed = units.speeds(of["speed"])
@@ -109,7 +109,7 @@ def bode_figure(result: UnbalanceResult) -> Figure:
         for panel in (above, below):
             panel.axvspan(*units.speeds(operating), color="C2", alpha=0.12, lw=0)
     above.set_ylabel("larger semi-axis (m)")
-    above.legend(fontsize=8, frameon=False)
+    above.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
     below.set_ylabel("phase of u₂ (°)")
     return figure
 
@@ -153,7 +153,7 @@ def orbits_figure(result: UnbalanceResult) -> Figure:
         axis.set(xlabel="u₂ (m)", ylabel="u₃ (m)" if column == 0 else "")
         axis.tick_params(labelsize=7)
         axis.ticklabel_format(style="sci", scilimits=(-2, 2))
-    figure.axes[0].legend(fontsize=7, frameon=False)
+    figure.axes[-1].legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=7, frameon=False)
     return figure
 
 
@@ -162,11 +162,11 @@ def shapes_figure(result: UnbalanceResult) -> Figure:
     from rotfem.results.plots import panels_over
 
     units = ShownUnits.of(result.summary)
-    figure, (axis,) = panels_over("x along the shaft (m)", 1, f"{_title(result)}: deflected shape")
+    figure, (axis,) = panels_over("x along the shaft (m)", 1, f"{_title(result)}: deflected shape", beside=1.1)
     for speed in result.at_peaks:
         y, z = result.shapes[speed]
         major = np.abs(y + 1j * z) / 2 + np.abs(y.conj() + 1j * z.conj()) / 2
         axis.plot(result.x, major, label=f"{units.speeds(result.speeds[speed]):.5g} {units.speed}")
     axis.set_ylabel("larger semi-axis (m)")
-    axis.legend(fontsize=8, frameon=False)
+    axis.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
     return figure

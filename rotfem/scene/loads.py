@@ -366,7 +366,7 @@ class UnbalanceTable(SceneModel):
         grade: balance quality G of ISO 21940-11 (mm/s), as 6.3, instead of kg_m: distance times service speed.
         mass: that the grade is of (kg).
         speed: service speed of the grade (rad/s).
-        start: time from which it is there (s), as after the loss of a blade, or None: always.
+        start: time after which it pushes (s), as after the loss of a blade.
     """
 
     x: Annotated[Number, unit("m")]
@@ -375,7 +375,7 @@ class UnbalanceTable(SceneModel):
     grade: Positive | None = None
     mass: Annotated[Positive, unit("kg")] | None = None
     speed: Annotated[Positive, unit("rad/s")] | None = None
-    start: Annotated[Number, unit("s")] | None = None
+    start: Annotated[Number, unit("s")] = 0.0
 
     def _check(self) -> None:
         of_grade = (self.grade, self.mass, self.speed)

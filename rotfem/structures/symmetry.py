@@ -33,7 +33,7 @@ def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
     The history starts undeformed, or in balance with what acts at t = 0.
     """
     structure: Any = resolved(structures[problem.structure.type].discretised)
-    if not _is_built_in(problem) or problem.frame != "rotating" or problem.motion.pitch is not None:
+    if not _is_built_in(problem) or problem.frame == "inertial" or problem.motion.pitch is not None:
         return ()
     if problem.structure.damping.has_modal:  # the modes at rest that have the ratios are those of all unknowns
         return ()

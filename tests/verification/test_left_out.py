@@ -14,7 +14,8 @@ from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.root import SpatialRoot, SupportTable
+from rotfem.scene.root import SpatialRoot
+from rotfem.scene.supports import SupportTable
 from rotfem.structures.symmetry import inactive_unknowns
 
 pytestmark = pytest.mark.usefixtures("unestimated")
@@ -217,10 +218,10 @@ KNOWN = {
     },
     SpatialRoot: {
         *("lag_stiffness", "lag_damping", "hinge_offset", "flap_stiffness", "flap_damping", "pitch_stiffness"),
-        *("pitch_damping", "pitch", "driven"),
+        *("pitch_damping", "pitch", "driven", "free"),
     },
     PointMass: {"x", "mass", "offset", "inertia"},
-    SupportTable: {"x", "stiffness", "damping"},
+    SupportTable: {"x", "stiffness", "damping", "tilt_stiffness", "tilt_damping", "housing", "frame"},
     PlateStructure: {
         *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),
         *("shear_correction", "hub_radius", "hub_offset", "point_masses", "line_masses", "damping"),
