@@ -326,17 +326,12 @@ class Solver(SceneModel):
         max_iterations: most Newton iterations per solve.
     """
 
+    GONE: ClassVar[Mapping[str, str]] = {
+        "continuation": "paths past limit points went with version 0.9: leave it out, the load is raised in steps"
+    }
+
     increment_tolerance: Positive = 1e-9
     max_iterations: Count = 25
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        if "continuation" in data:
-            why = (
-                "unknown key; paths past limit points went with version 0.9: leave it out, the load is raised in steps"
-            )
-            raise problem("continuation", None, why)
-        return data
 
 
 def _as_quantities(value: Any) -> tuple[str, ...]:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from inspect import Parameter, signature
+from inspect import signature
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, Tag
 
-from rotfem.errors import SceneError, show
+from rotfem.errors import SceneError
 from rotfem.registry import Registry, damping_models, register, structures
-from rotfem.scene.table import LISTED, SceneModel, did_you_mean, problem, unit
+from rotfem.scene.table import LISTED, SceneModel, problem, unit, unknown_key
 from rotfem.scene.values import NonNegative
 
 
@@ -36,33 +36,21 @@ class StructureKind:
 
 def designed(tables: dict[str, Any], file: str) -> dict[str, Any]:
     """Return the tables of a scene with the structure that a design stands for in its place."""
-    seen = set[str]()
-    while isinstance(given := tables.get("structure"), Mapping):
-        name = given.get("type")
-        if not isinstance(name, str) or name not in structures or structures[name].table is None:
-            break
-        if name in seen:
-            raise SceneError(file, "structure.type", name, "is a design that stands for itself")
-        seen.add(name)
-        parameters = {key: value for key, value in given.items() if key != "type"}
-        tables = {**tables, "structure": _table_of(structures[name].table, parameters, name, file)}
-    return tables
-
-
-def _table_of(table: Any, given: dict[str, Any], name: str, file: str) -> dict[str, Any]:
-    known = signature(table).parameters
-    for key in given:
+    given = tables.get("structure")
+    name = given.get("type") if isinstance(given, Mapping) else None
+    design: Any = structures[name].table if isinstance(name, str) and name in structures else None
+    if not isinstance(given, Mapping) or design is None:
+        return tables
+    parameters = {key: value for key, value in given.items() if key != "type"}
+    known = signature(design).parameters
+    for key in parameters:
         if key not in known:
-            allowed = f"unknown key; {did_you_mean(key, known)}allowed: {', '.join(known)}"
-            raise SceneError(file, f"structure.{key}", None, allowed)
-    for key, parameter in known.items():
-        if parameter.default is Parameter.empty and key not in given:
-            why = f"required key is missing; type = {show(name)} needs it"
-            raise SceneError(file, f"structure.{key}", None, why)
+            raise SceneError(file, f"structure.{key}", None, unknown_key(key, known))
     try:
-        return dict(table(**given))
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        table = dict(design(**parameters))
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # TypeError: a parameter is missing
         raise SceneError(file, "structure.type", name, f"the design fails: {type(error).__name__}: {error}") from None
+    return designed({**tables, "structure": table}, file)
 
 
 for _name, _home in (

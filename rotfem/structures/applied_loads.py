@@ -15,10 +15,11 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
-from rotfem.mechanics.bodies import AppliedLoad, Kinematics
-from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, Shapes, is_moment
+from rotfem.mechanics.bodies import Kinematics
+from rotfem.mechanics.loads import AppliedLoad, Load, PlaceLoad, Shapes
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
+from rotfem.scene.loads import is_moment
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import field_values
 
@@ -186,7 +187,7 @@ class Loaded:
         given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
         return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
 
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+    def applied(self, name: str, load: Load) -> list[AppliedLoad]:
         """Return the work of one load."""
         dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
         if is_moment(name):
@@ -206,7 +207,7 @@ class Loaded:
         """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
         return load
 
-    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
+    def amplitude(self, name: str, load: Load, size: int) -> Any:
         """Return a load in the forms, its first `size` components, and remember its amplitude."""
         made: Amplitude
         if isinstance(load, PlaceLoad):

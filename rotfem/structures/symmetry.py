@@ -20,9 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.effects import Effect
-from rotfem.mechanics.loads import AnyLoad, is_moment
+from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import damping_models, resolved, structures
+from rotfem.scene.loads import is_moment
 
 Array = npt.NDArray[np.float64]
 
@@ -78,7 +79,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     return polar, axial
 
 
-def _of_load(load: AnyLoad) -> Array:
+def _of_load(load: Load) -> Array:
     """Return the largest size of each component of a load over all times, shape (3,); infinite where it is unknown."""
     values = np.zeros(3) if load.is_zero else load.sizes()
     if values is None:

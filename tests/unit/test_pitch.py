@@ -143,7 +143,8 @@ def test_dead_loads_keep_their_direction_in_the_hub() -> None:
     pitch = Pitch(lambda t: 0.2 + t, lambda t: 1.0, lambda t: 0.0, axis, np.zeros(3), start=0.2)
     shapes = Shapes.along_span([[0.0, 1.0, 2.0, 3.0], [4.0, -1.0, 0.5, 0.0]])
     given = Load("dead", (Term.table([[0, 1.0], [2, 3.0]], shapes),))
-    loads = Loads(named={"distributed": given, "tip_force": Load.of_components((1.0, 2.0, 3.0))}).pitched(pitch)
+    uniform = Load("dead", (Term(Shapes.uniform([(1.0, 2.0, 3.0)])),))
+    loads = Loads(named={"distributed": given, "tip_force": uniform}).pitched(pitch)
     spread, same = loads.named["distributed"], loads.named["tip_force"]
     assert isinstance(spread, Load)
     assert isinstance(same, Load)
