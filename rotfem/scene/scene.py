@@ -130,10 +130,7 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
-        try:
-            tables = to_builtin(data)
-        except RecursionError:
-            raise SceneError(file, allowed="tables or lists are nested too deep") from None
+        tables = to_builtin(data)
         with noted_files() as extensions:
             load_wanted(tables, file, directory)
         given = tables.get("motion")
@@ -225,7 +222,23 @@ class Scene(SceneModel):
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
 
     def _check(self) -> None:
-        check_together(self)
+        """Refuse tables that cannot be combined, the most basic of them first."""
+        structure, motion, model = self.structure, self.motion, self.model
+        if structure.is_planar:
+            check_planar(motion, self.loads)
+        if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
+            raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
+        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_mesh(structure, self.mesh)
+        check_theory(structure, model)
+        check_frame(structure, motion, model)
+        check_initial(structure, motion, model, self.initial)
+        if self.accuracy is None and self.accuracy_budget is not None:
+            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
+        if self.accuracy is not None and not self.output.error:
+            why = "cannot be combined with accuracy, which is met by what is estimated"
+            raise problem("output.error", False, why)
+        self.output.check(structure.type, structure.length)
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -273,22 +286,6 @@ def plain(value: Any) -> Any:
 
 
 # --- what tables say together: each check raises a problem that names the key to change ------------------------------
-
-
-def check_together(scene: Scene) -> None:
-    """Refuse tables of a scene that cannot be combined, the most basic of them first."""
-    structure, motion, model = scene.structure, scene.motion, scene.model
-    if structure.is_planar:
-        check_planar(motion, scene.loads)
-    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
-        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
-    check_loads(structure, motion.is_free, scene.loads, scene.time is not None)
-    check_mesh(structure, scene.mesh)
-    check_theory(structure, model)
-    check_frame(structure, motion, model)
-    check_initial(structure, motion, model, scene.initial)
-    check_accuracy(scene)
-    scene.output.check(structure.type, structure.length)
 
 
 def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
@@ -398,14 +395,3 @@ def _check_velocity(structure: Any, rows: Matrix) -> None:
         why = "the third component must be 0 for a planar_beam"
     if why is not None:
         raise problem("initial.velocity", None, why)
-
-
-def check_accuracy(scene: Scene) -> None:
-    """Refuse what an accuracy excludes, and a budget without one."""
-    if scene.accuracy is None:
-        if scene.accuracy_budget is not None:
-            reason = "is what an accuracy may take, and needs accuracy"
-            raise problem("accuracy_budget", scene.accuracy_budget, reason)
-        return
-    if not scene.output.error:
-        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")
