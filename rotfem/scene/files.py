@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,28 +17,8 @@ from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
 from rotfem.units import is_quantity
 
-#: Files that a scene which is being read consists of; None where they are not recorded.
-_read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
-
-
-@contextmanager
-def noted_files() -> Iterator[list[Path]]:
-    """Give a list that the paths of all files are in which are read in the meantime."""
-    files, before = list[Path](), _read.get()
-    token = _read.set(files)
-    try:
-        yield files
-    finally:
-        _read.reset(token)
-        if before is not None:
-            before += files
-
-
-def note(path: Path) -> None:
-    """Take note of a file that is read."""
-    files = _read.get()
-    if files is not None:
-        files.append(path.absolute())
+#: Files that have been read, in order; those that a scene consists of are the ones since its reading began.
+READ: list[Path] = []
 
 
 class Unreadable(Exception):
@@ -49,7 +27,7 @@ class Unreadable(Exception):
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file."""
-    note(path)
+    READ.append(path.absolute())
     try:
         return path.read_bytes()
     except FileNotFoundError:
@@ -158,7 +136,7 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not found:
         what = "is no regular file" if there else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
-    note(path)
+    READ.append(path)
     return path
 
 

@@ -18,7 +18,7 @@ from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, noted_files, read_toml, set_keys, to_builtin
+from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
 from rotfem.scene.loads import LoadsTable, check_loads, is_moment
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
@@ -130,9 +130,8 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
-        tables = to_builtin(data)
-        with noted_files() as extensions:
-            load_wanted(tables, file, directory)
+        tables, before = to_builtin(data), len(READ)
+        load_wanted(tables, file, directory)
         given = tables.get("motion")
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
@@ -140,12 +139,11 @@ class Scene(SceneModel):
         kind = structure.get("type") if isinstance(structure, Mapping) else None
         context = {"directory": directory, "accuracy": whole.get("accuracy"), "type": kind}
         try:
-            with noted_files() as files:
-                scene = cls.model_validate(whole, context={**context, "hints": hints})
+            scene = cls.model_validate(whole, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
-        scene._inputs = (*extensions, *files)
+        scene._inputs = tuple(dict.fromkeys(READ[before:]))
         return scene
 
     def __repr__(self) -> str:
@@ -244,10 +242,9 @@ class Scene(SceneModel):
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     """Return the validated scene of a TOML file."""
     path = Path(path)
-    with noted_files() as files:
-        tables = apply_overrides(path.name, read_toml(path), overrides)
-        scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
-    scene._inputs = tuple(files)
+    tables = apply_overrides(path.name, read_toml(path), overrides)
+    scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene._inputs = (path.absolute(), *scene._inputs)
     return scene
 
 

@@ -59,9 +59,6 @@ def test_fast_files_are_recognised_by_their_keys(tmp_path: Path) -> None:
     assert beam.damping.kelvin_voigt == 1e-3
     other = decks.beamdyn_blade().replace("BEAMDYN V1.00", "anything")
     assert blade(tmp_path, other, structure_length=decks.LENGTH) == beam
-    (tmp_path / "bytes.dat").write_bytes(b"\0\1\2")
-    with pytest.raises(rotfem.SceneError, match="cannot be read: it is no text"):
-        read(tmp_path, "bytes.dat", structure_length=1.0)
 
 
 def test_bmodes(tmp_path: Path) -> None:
