@@ -23,13 +23,13 @@ from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
 from rotfem.equations.solutions import Solutions
 from rotfem.errors import ComputationError
+from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import Assembler, added
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
-from rotfem.scene.loads import is_moment
 from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]

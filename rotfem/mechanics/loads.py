@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from rotfem.mechanics.bodies import Moved
 from rotfem.mechanics.pitch import Pitch
-from rotfem.scene.loads import Harmonic, LoadsTable, LoadTable, Signal, is_moment
 from rotfem.short import short_fields
 from rotfem.users_functions import checked
 
@@ -242,7 +241,7 @@ class Loads:
     __repr__ = short_fields
 
     @classmethod
-    def of(cls, given: LoadsTable, structure: Any, angle: Callable[[float], float]) -> Loads:
+    def of(cls, given: Any, structure: Any, angle: Callable[[float], float]) -> Loads:
         """Return the loads that a scene or a script gives, as sums."""
         named = {name: load_of(f"loads.{name}", load, structure, angle, kind) for name, load, kind in given.named()}
         return cls(given.gravity, named, tuple(point.x for point in given.at))
@@ -278,7 +277,7 @@ class Loads:
         return self.replaced({name: _in_blade(load, pitch) for name, load in dead.items()})
 
 
-def load_of(key: str, given: Signal, structure: Any, angle: Callable[[float], float], kind: str = "dead") -> Load:
+def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float], kind: str = "dead") -> Load:
     """Return one load, or another signal."""
     planar = structure.is_planar
     size = 1 if key == "loads.pressure" or (planar and is_moment(key)) else 3
@@ -291,7 +290,7 @@ def load_of(key: str, given: Signal, structure: Any, angle: Callable[[float], fl
         probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
         places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
         return PlaceLoad(kind=kind, function=at, probes=places, constant=not timed)
-    terms = [_harmonic(harmonic, angle) for harmonic in given.harmonic] if isinstance(given, LoadTable) else []
+    terms = [_harmonic(harmonic, angle) for harmonic in getattr(given, "harmonic", ())]
     if callable(value):
         of_time = checked(value, key, size, "time", planar)
         each = Shapes.uniform(np.eye(size))
@@ -307,7 +306,7 @@ def load_of(key: str, given: Signal, structure: Any, angle: Callable[[float], fl
     return Load(kind, tuple(terms))
 
 
-def _harmonic(given: Harmonic, angle: Callable[[float], float]) -> Term:
+def _harmonic(given: Any, angle: Callable[[float], float]) -> Term:
     """Return one shape with the amplitude cos(α(t) + phase), α = ω t or per_rev · ψ(t)."""
     amplitude, rate = given.amplitude, given.frequency or given.per_rev or 0.0
     shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
@@ -317,6 +316,11 @@ def _harmonic(given: Harmonic, angle: Callable[[float], float]) -> Term:
         return np.cos(rate * turned + given.phase)[:, None]
 
     return Term(shapes, at, linear=False, largest=np.ones(1), phase=given.phase)
+
+
+def is_moment(name: str) -> bool:
+    """Return whether a named load is a moment."""
+    return name.endswith("moment")
 
 
 def _in_blade(load: Load, pitch: Pitch) -> Load:

@@ -388,11 +388,6 @@ class LoadsTable(SceneModel):
                     yield f"at.{i}.{name}", load, load.kind if "kind" in load.model_fields_set else point.kind
 
 
-def is_moment(name: str) -> bool:
-    """Return whether a named load is a moment."""
-    return name.endswith("moment")
-
-
 # --- checks against what the loads work on ------------------------------------------------------------------------
 
 
@@ -404,7 +399,7 @@ def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) 
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load, _ in loads.named():
         key = f"loads.{name}"
-        if is_moment(name):
+        if name.endswith("moment"):
             _check_moment(key, structure, load)
         if isinstance(load, SpanLoad) and load.table is not None:
             _check_table(key, structure, load.table, timed)

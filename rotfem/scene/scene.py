@@ -19,7 +19,7 @@ from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import LoadsTable, check_loads, is_moment
+from rotfem.scene.loads import LoadsTable, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
     AngularUnit,
@@ -290,7 +290,7 @@ def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     forces: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not is_moment(name)}
+    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not name.endswith("moment")}
     for key, signal in forces.items():
         if signal is not None and any(len(vector) > 2 and vector[2] != 0.0 for _, vector in signal.vectors):
             value = list(signal.value) if signal.value is not None else None

@@ -16,10 +16,9 @@ import ufl
 from dolfinx import fem
 
 from rotfem.mechanics.bodies import Kinematics
-from rotfem.mechanics.loads import AppliedLoad, Load, PlaceLoad, Shapes
+from rotfem.mechanics.loads import AppliedLoad, Load, PlaceLoad, Shapes, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
-from rotfem.scene.loads import is_moment
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import field_values
 

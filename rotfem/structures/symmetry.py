@@ -20,10 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.effects import Effect
-from rotfem.mechanics.loads import Load
+from rotfem.mechanics.loads import Load, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import damping_models, resolved, structures
-from rotfem.scene.loads import is_moment
 
 Array = npt.NDArray[np.float64]
 
