@@ -107,20 +107,9 @@ def beam_of(row: Row) -> Tables:
 
 
 def spatial_section() -> Tables:
-    """Return a section that tapers; its centre of mass is ahead of the axis, and its stretch bends it in the plane."""
-    mass, ahead = 0.5, 0.01
-    about2, about3 = 1e-4, 2e-4 + mass * ahead**2
-
-    def table(diagonal: list[float], couplings: dict[tuple[int, int], float]) -> list[Any]:
-        matrix = [[value * (i == j) for j in range(6)] for i, value in enumerate(diagonal)]
-        for (i, j), value in couplings.items():
-            matrix[i][j] = matrix[j][i] = value
-        return [[0.0, matrix], [LENGTH, [[0.8 * entry for entry in line] for line in matrix]]]
-
-    return {
-        "stiffness": table([1e5, 3e4, 3e4, 40.0, 60.0, 120.0], {(0, 5): 100.0}),
-        "mass": table([mass] * 3 + [about2 + about3, about2, about3], {(0, 5): -mass * ahead, (2, 3): mass * ahead}),
-    }
+    """Return a section that bends and twists in all ways, uncoupled: others are in test_blade_sections."""
+    stiffness = {"EA": 1e5, "GA2": 3e4, "GA3": 3e4, "GJ": 40.0, "EI2": 60.0, "EI3": 120.0}
+    return {**stiffness, "mass_per_length": 0.5, "rotary_inertia2": 1e-4, "rotary_inertia3": 2e-4}
 
 
 def plate_of(row: Row) -> Tables:

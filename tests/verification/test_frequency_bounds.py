@@ -10,8 +10,6 @@ import pytest
 from rotfem import campbell, modes
 from tests.hard.cases.modes import ELEMENTS, beam
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 
 def test_bounds_in_decimals() -> None:
     """Beams of r/L from 1e-2 to 1e-7 against 50 digits: errors below their bounds, and slender ones below 1e-11."""

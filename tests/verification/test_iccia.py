@@ -9,15 +9,13 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from rotfem import ComputationError, run
-
-pytestmark = pytest.mark.usefixtures("unestimated")
 
 Array = npt.NDArray[np.float64]
 
@@ -28,45 +26,32 @@ LENGTH, EI, DENSITY = 8.0, 6.8952e10 * 8.2189e-9, 2766.0 * 7.2986e-5
 AT_REST = 3.5160153 * np.sqrt(EI / DENSITY / LENGTH**4)
 
 
-class Expected(NamedTuple):
-    """Least tip u2 (m), its time (s), and amplitude of the vibration left after 15 s (m)."""
-
-    min_u2: float
-    t_min: float
-    residual: float
-
-
 #: (R, speed, name of the theory in the reference values, here)
-CASES = {
-    (0, 2, "zero", "linear"): Expected(-0.3431602268, 8.716967312, 0.01063206551),
-    (0, 2, "cl_svq", "consistent_linear"): Expected(-0.2802527976, 7.019424574, 0.001248416979),
-    (0, 4, "cl_svq", "consistent_linear"): Expected(-0.5344240128, 6.76581809, 0.008299202407),
-    (0, 4, "cl_vk", "von_karman_linear"): Expected(-0.5344240127, 6.76581809, 0.008299202424),
-    (0, 4, "second", "second_order"): Expected(-0.5301745296, 6.761112765, 0.00847052102),
-    (0, 4, "reissner", "reissner"): Expected(-0.5336129127, 6.765162602, 0.008311106918),
-    (1, 2, "reissner", "reissner"): Expected(-0.3223907929, 6.911583052, 0.003411576224),
-    (1, 4, "cl_svq", "consistent_linear"): Expected(-0.5941404278, 6.569467284, 0.005724178077),
-    (1, 4, "reissner", "reissner"): Expected(-0.5928518535, 6.56839494, 0.005690301202),
-}
+CASES = [
+    (0, 2, "zero", "linear"),
+    (0, 4, "cl_svq", "consistent_linear"),
+    (0, 4, "cl_vk", "von_karman_linear"),
+    (0, 4, "second", "second_order"),
+    (1, 2, "reissner", "reissner"),
+    (1, 4, "cl_svq", "consistent_linear"),
+    (1, 4, "reissner", "reissner"),
+]
 
 
-@pytest.mark.parametrize("case", list(CASES), ids=str)
+@pytest.mark.parametrize("case", CASES, ids=str)
 def test_peak_and_residual_vibration(
     hub_beam: Any, reference: Callable[[str], Path], case: tuple[int, int, str, str]
 ) -> None:
     radius, speed, name, theory = case
-    expected = CASES[case]
+    with reference("iccia_tip_history.csv").open(newline="") as file:
+        row = {line["case"]: line for line in csv.DictReader(file)}[f"R={radius},Om={speed},{name}"]
     changes = {"structure.hub_radius": radius, "motion.speed": speed, "model.theory": theory}
     result = run(hub_beam(changes, time=TIME))
     figures, h = result.summary["figures"], result.history
     late = h["tip_u2"][h["t"] > 15.0 - 1e-9]
-    assert figures["tip_u2_min"] == pytest.approx(expected.min_u2, abs=TOLERANCE)
-    assert figures["tip_u2_min_time"] == pytest.approx(expected.t_min, abs=1e-3)
-    assert np.ptp(late) / 2 == pytest.approx(expected.residual, abs=TOLERANCE)
-    with reference("iccia_tip_history.csv").open(newline="") as file:
-        row = {line["case"]: line for line in csv.DictReader(file)}[f"R={radius},Om={speed},{name}"]
-    in_file = (row["min_u2"], row["t_min"], row["residual amplitude (15..30)"])
-    np.testing.assert_allclose([float(v) for v in in_file], expected, rtol=1e-9)
+    assert figures["tip_u2_min"] == pytest.approx(float(row["min_u2"]), abs=TOLERANCE)
+    assert figures["tip_u2_min_time"] == pytest.approx(float(row["t_min"]), abs=1e-3)
+    assert np.ptp(late) / 2 == pytest.approx(float(row["residual amplitude (15..30)"]), abs=TOLERANCE)
 
 
 @pytest.mark.parametrize("speed", [4.0, 8.0])

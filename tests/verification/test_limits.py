@@ -22,8 +22,6 @@ from rotfem.mechanics.motion import smooth_spin_up
 from rotfem.mechanics.theories import ladder
 from rotfem.numerics.newton import Newton
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 

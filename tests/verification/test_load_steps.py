@@ -11,8 +11,6 @@ from scipy.special import ellipe, ellipk
 
 import rotfem
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
 
 

@@ -19,8 +19,6 @@ from rotfem.equations.compiled import compile_system
 from rotfem.numerics.newton import Newton
 from rotfem.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
 
 

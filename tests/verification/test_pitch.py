@@ -9,8 +9,6 @@ import pytest
 
 import rotfem
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 L, HUB, MASS = 2.0, 0.5, 3.0
 #: Rotary inertias per length about axes 2 and 3, and the centre of mass beside the axis.
 INERTIA, CENTER = (0.02, 0.3), (0.05, -0.02)

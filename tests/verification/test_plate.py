@@ -18,9 +18,6 @@ from tests.plate_mesh_files import grid, write_msh
 
 from .conftest import reference_file
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
-
 E, NU, RHO = 70e9, 0.3, 2700.0
 
 

@@ -10,8 +10,6 @@ from scipy.integrate import solve_ivp
 
 import rotfem
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 L, RHO = 10.0, 1.2
 STILL, SPIN = {"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 5.0}
 #: So stiff that the blade is rigid: its first frequency of bending is 90 Ω.

@@ -20,8 +20,6 @@ from rotfem.equations.system import System
 from rotfem.registry import effects
 from tests.beams import STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 AT_REST = {"type": "constant", "speed": 0.0}

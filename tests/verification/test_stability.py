@@ -9,8 +9,6 @@ import pytest
 
 import rotfem
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
 UNIT = EI / LENGTH**2  # of forces, N
 RATE = np.sqrt(EI / MASS) / LENGTH**2  # 1/s
