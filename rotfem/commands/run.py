@@ -283,7 +283,7 @@ class Simulation:
         if self.march is None:
             return error
         if self.log.steps == 0:
-            self.system.held.model.check_smooth()
+            self.system.model.check_smooth()
         if self.system.hub is not None and self.system.hub.torque.controlled:
             what = f"{error.what}; where a torque jumps with the motion, the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)

@@ -145,7 +145,7 @@ def _isotropic(value: Any) -> Any:
 TwoByTwo = Annotated[tuple[tuple[NonNegative, Number], tuple[Number, NonNegative]], BeforeValidator(_isotropic)]
 
 
-class Support(SceneModel):
+class SupportTable(SceneModel):
     """A bearing of a shaft: a spring and a damper between a section and the fixed frame, across the axis of spin.
 
     Forces along directions 2 and 3 of the fixed frame are −stiffness · (y, z) − damping · (ẏ, ż).

@@ -19,9 +19,19 @@ from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import apply_overrides, noted_files, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import Loads, check_loads, check_tables
-from rotfem.scene.motion import AnyMotion, Motion
-from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
+from rotfem.scene.loads import LoadsTable, check_loads
+from rotfem.scene.motion import AnyMotion, MotionTable
+from rotfem.scene.settings import (
+    AngularUnit,
+    BeamMesh,
+    Initial,
+    ModelTable,
+    ModesTable,
+    OutputTable,
+    PlateMesh,
+    Solver,
+    Time,
+)
 from rotfem.scene.structure import designed
 from rotfem.scene.table import SceneModel, empty, problem, scene_error, unit
 from rotfem.scene.values import ROUND_OFF, Matrix
@@ -93,12 +103,12 @@ class Scene(SceneModel):
 
     structure: Structure
     motion: AnyMotion
-    model: Model = empty()
+    model: ModelTable = empty()
     initial: Initial = empty()
-    loads: Loads = empty()
+    loads: LoadsTable = empty()
     mesh: Mesh = empty()
     time: Time | None = None
-    modes: Modes = empty()
+    modes: ModesTable = empty()
     solver: Solver = empty()
     output: OutputTable = empty()
     extensions: Extensions = empty()
@@ -213,11 +223,6 @@ class Scene(SceneModel):
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
-        self.check_tables("a steady state" if self.time is None else "")
-
-    def check_tables(self, when: str) -> None:
-        """Check that no table of a load along the structure may be of two kinds."""
-        check_tables(self._file, self.structure, self.loads, when)
 
     def _check(self) -> None:
         check_together(self)
@@ -277,7 +282,7 @@ def check_together(scene: Scene) -> None:
         check_planar(motion, scene.loads)
     if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
         raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
-    check_loads(structure, motion.is_free, scene.loads)
+    check_loads(structure, motion.is_free, scene.loads, scene.time is not None)
     check_mesh(structure, scene.mesh)
     check_theory(structure, model)
     check_frame(structure, motion, model)
@@ -286,14 +291,14 @@ def check_together(scene: Scene) -> None:
     scene.output.check(structure.type, structure.length)
 
 
-def check_planar(motion: Motion, loads: Loads) -> None:
+def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load, _ in loads.named() if load.VECTORS.padded}
-    for key, signal in vectors.items():
-        if signal is not None and not signal.is_planar:
+    forces: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
+    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not name.endswith("moment")}
+    for key, signal in forces.items():
+        if signal is not None and any(len(vector) > 2 and vector[2] != 0.0 for _, vector in signal.vectors):
             value = list(signal.value) if signal.value is not None else None
             raise problem(key, value, "the third component must be 0 for a planar_beam")
     if loads.gravity[2] != 0.0:
@@ -311,7 +316,7 @@ def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
             raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
-def check_theory(structure: Any, model: Model) -> None:
+def check_theory(structure: Any, model: ModelTable) -> None:
     """Refuse a theory that has no strains for the structure."""
     kind, theory = structure.type, registry.theories[model.theory]
     if not theory.holds_for(kind):
@@ -321,7 +326,7 @@ def check_theory(structure: Any, model: Model) -> None:
     check_prestress(structure, model)
 
 
-def check_prestress(structure: Any, model: Model) -> None:
+def check_prestress(structure: Any, model: ModelTable) -> None:
     """Refuse to say what the prestress is of where there is none, or one kind of it only."""
     kind = structure.type
     if model.prestress is None:
@@ -338,7 +343,7 @@ def check_prestress(structure: Any, model: Model) -> None:
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
-def check_frame(structure: Any, motion: Motion, model: Model) -> None:
+def check_frame(structure: Any, motion: MotionTable, model: ModelTable) -> None:
     """Refuse the inertial-frame form where there is none."""
     if structure.pitches and motion.is_free:
         raise problem("structure.root.pitch", None, 'over time needs a speed that is prescribed, not type = "torque"')
@@ -360,7 +365,7 @@ def check_frame(structure: Any, motion: Motion, model: Model) -> None:
             raise problem("model.effects", list(model.effects), f'"{effect.name}" {why}')
 
 
-def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial) -> None:
+def check_initial(structure: Any, motion: MotionTable, model: ModelTable, initial: Initial) -> None:
     """Refuse an initial state that the scene cannot have."""
     displacement = initial.tip_displacement
     if displacement is not None:

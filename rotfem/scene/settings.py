@@ -44,7 +44,7 @@ _LADDER = 'it went with version 0.9; "accuracy" chooses mesh and steps, "rotfem 
 _REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
 
 
-class Model(SceneModel):
+class ModelTable(SceneModel):
     """The [model] table.
 
     Attributes:
@@ -299,7 +299,7 @@ def _increasing_pair(speeds: tuple[float, float]) -> tuple[float, float]:
     return speeds
 
 
-class Modes(SceneModel):
+class ModesTable(SceneModel):
     """The [modes] table.
 
     Attributes:

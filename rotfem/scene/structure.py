@@ -91,7 +91,7 @@ Modal = Annotated[
 ]
 
 
-class Damping(SceneModel):
+class DampingTable(SceneModel):
     """The [structure.damping] table.
 
     Attributes:

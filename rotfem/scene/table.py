@@ -23,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from rotfem.errors import Problem, SceneError, show
+from rotfem.errors import Fault, SceneError, show
 from rotfem.registry import Registry
 from rotfem.short import short
 from rotfem.units import is_quantity, quantity
@@ -280,7 +280,7 @@ def scene_error(file: str, error: ValidationError) -> SceneError:
     return SceneError(file, *first, others)
 
 
-def _problem(details: dict[str, Any]) -> Problem:
+def _problem(details: dict[str, Any]) -> Fault:
     """Return a problem in our words: path of the key without the tags of types, value, what is allowed."""
     path = [part for part in map(str, details["loc"]) if not part.startswith("<")]
     context, value, kind = details.get("ctx", {}), details["input"], details["type"]
@@ -298,4 +298,4 @@ def _problem(details: dict[str, Any]) -> Problem:
         reason = _ALLOWED[kind].format(**context) if kind in _ALLOWED else str(details["msg"])
     if isinstance(value, Mapping):
         value = None  # a whole table says nothing that its key does not
-    return Problem(".".join(path), value, reason)
+    return Fault(".".join(path), value, reason)

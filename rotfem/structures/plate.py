@@ -137,9 +137,7 @@ class Plate(Structure):
     is_flat = True
     prestress_strains: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
-    #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
-    #: Mode families: the components whose kinetic energy counts, and the one whose shape is examined.
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):

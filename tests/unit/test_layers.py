@@ -144,7 +144,7 @@ def asked_for(code: ast.AST) -> set[str]:
 
 def test_nothing_branches_on_a_class_of_system_motion_structure_or_scheme() -> None:
     speaking = {name for m in MODULES if m.startswith(SPEAKING) for name in classes(m)}
-    assert {"System", "BorderedSystem", "Motion", "FreeHub", "Structure", "Plate", "GeneralisedAlpha"} <= speaking
+    assert {"System", "NonlinearSystem", "Motion", "FreeHub", "Structure", "Plate", "GeneralisedAlpha"} <= speaking
     assert {module: found for module in MODULES if (found := asked_for(tree(module)) & speaking)} == {}
 
 

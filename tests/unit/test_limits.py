@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.errors import InputError, Problem, SceneError, printable, show
+from rotfem.errors import Fault, InputError, SceneError, printable, show
 from rotfem.scene import Scene, load_scene
 from rotfem.structures.structure import check_memory
 from tests.beams import STRUCTURE
@@ -115,5 +115,5 @@ def test_values_are_shown_briefly_and_in_one_line() -> None:
         assert len(show(value)) <= 200
         assert show(value).isprintable()
     assert printable("a\nb\tc") == "a\\nb\\tc"
-    error = SceneError("a.toml", "key", 1, "no", [Problem(f"key\n{i}", None, "no") for i in range(1000)])
+    error = SceneError("a.toml", "key", 1, "no", [Fault(f"key\n{i}", None, "no") for i in range(1000)])
     assert len(str(error).splitlines()) == 22

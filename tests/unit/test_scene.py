@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 import rotfem
 from rotfem.commands.problem import motion_of
-from rotfem.errors import Problem, SceneError
+from rotfem.errors import Fault, SceneError
 from rotfem.scene import (
     BeamMesh,
     PlanarBeamStructure,
@@ -152,7 +152,7 @@ def test_loads_in_all_their_forms() -> None:
     bare = made(tip_force=[1, 2])["tip_force"]
     np.testing.assert_array_equal(bare.at(7.0), [1, 2, 0])
     assert (bare.kind, bare.constant, bare.is_zero) == ("dead", True, False)
-    table = made(distributed={"table": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})["distributed"]
+    table = made(distributed={"over_time": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})["distributed"]
     np.testing.assert_allclose([table.at(t) for t in (-1, 0.5, 9)], [[0, 0, 0], [1, 2, 0], [4, 8, 0]])
     assert (table.kind, table.constant) == ("follower", False)
     np.testing.assert_array_equal(made(tip_moment=5)["tip_moment"].at(0.0), [5.0])
@@ -400,7 +400,7 @@ def test_relative_paths_start_at_the_scene(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_scene_error_survives_pickling() -> None:
-    error = SceneError("a.toml", "mesh.degree", 9, "must be at most 6", [Problem("time", None, "missing")])
+    error = SceneError("a.toml", "mesh.degree", 9, "must be at most 6", [Fault("time", None, "missing")])
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "a.toml: mesh.degree = 9: must be at most 6 (and 1 more)\n  time: missing"
     assert again.problems == error.problems

@@ -127,22 +127,6 @@ def test_a_burst_in_a_table_is_not_passed_over() -> None:
     assert np.max(np.abs(found["tip_u2"] - fine["tip_u2"])) < 1e-2 * np.max(np.abs(fine["tip_u2"]))
 
 
-def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A hub held at a speed by a switch slides on its jump in ever shorter steps."""
-    monkeypatch.setattr("rotfem.analysis.march.MEAN", 25)
-    monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 500)
-    switch = {
-        "type": "torque",
-        "hub_inertia": 50.0,
-        "function": lambda t, psi, speed, tip: -40.0 * np.sign(speed - 0.1),
-    }
-    scene = {"structure": STRUCTURE, "motion": switch, "mesh": {"elements": 2}}
-    with pytest.raises(rotfem.ComputationError, match="do not reach the end") as caught:
-        run({**scene, "time": {"end": 1.0, "tolerance": 1e-3}})
-    assert "a hysteresis" in caught.value.advice
-    assert caught.value.time is not None
-
-
 def test_advice_where_steps_are_too_short() -> None:
     tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"state": "undeformed"}}
     time = {"end": 10.0, "tolerance": 1e-6, "min_step": 0.1}

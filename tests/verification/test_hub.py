@@ -129,7 +129,7 @@ def test_border_is_the_derivative_of_both_equations(theory: str, coupled: bool) 
     }
     system = Problem.of(hub_scene(changes)).system()
     system.set_time(0.03)
-    random, free = np.random.default_rng(3), np.ones(len(system.zeros()), dtype=bool)
+    random, free = np.random.default_rng(3), np.ones(len(system.zeros()) + 1, dtype=bool)
     free[system.clamped] = False
     size = np.append(system.scale, 1.0) * free
     state = [random.normal(size=free.size) * size * s for s in (1e-3, 1.0, 100.0)]
@@ -142,7 +142,7 @@ def test_border_is_the_derivative_of_both_equations(theory: str, coupled: bool) 
     for which, (name, step) in enumerate((("K", 1e-6), ("C", 1e-2), ("M", 1.0))):
         difference = (equations(which, step) - equations(which, -step)) / (2 * step)
         system.set_state(*state)
-        matrices = dict(zip("MCK", system.with_hub(system.held.mass_damping_stiffness()), strict=True))
+        matrices = dict(zip("MCK", system.with_hub(system.mass_damping_stiffness()), strict=True))
         bordered = matrices[name].convert("dense").getDenseArray()
         off = np.abs(bordered @ direction - difference)[free]
         assert np.max(off[:-1]) < 1e-6 * np.max(np.abs(difference[:-1]))

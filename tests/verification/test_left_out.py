@@ -12,6 +12,9 @@ from rotfem import run
 from rotfem.commands.problem import Problem
 from rotfem.registry import damping_models
 from rotfem.scene import as_scene
+from rotfem.scene.beams import PointMass, SpatialBeamStructure
+from rotfem.scene.plates import PlateStructure
+from rotfem.scene.root import SpatialRoot, SupportTable
 from rotfem.structures.symmetry import inactive_unknowns
 
 BEAM: dict[str, Any] = {
@@ -166,6 +169,31 @@ def test_what_a_script_adds_is_not_known_to_be_symmetric() -> None:
         damping_models.remove("sideways")
     for more in ({"terms": {"push": lambda m, v: 0}}, {"outputs": {"twist": lambda m: 0}}):
         assert inactive_unknowns(Problem.of(as_scene(data), **more)) == ()
+
+
+#: Keys of structures that `is_symmetric` knows, or that every plane of symmetry allows.
+KNOWN = {
+    SpatialBeamStructure: {
+        *("type", "length", "hub_radius", "hub_offset", "tip_mass", "tip_inertia", "tip_offset", "masses", "section"),
+        *("pretwist", "sweep", "line", "precone", "root", "supports", "damping"),
+    },
+    SpatialRoot: {
+        *("lag_stiffness", "lag_damping", "hinge_offset", "flap_stiffness", "flap_damping", "pitch_stiffness"),
+        *("pitch_damping", "pitch", "driven"),
+    },
+    PointMass: {"x", "mass", "offset", "inertia"},
+    SupportTable: {"x", "stiffness", "damping"},
+    PlateStructure: {
+        *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),
+        *("shear_correction", "hub_radius", "hub_offset", "point_masses", "line_masses", "damping"),
+    },
+}
+
+
+@pytest.mark.parametrize("table", KNOWN, ids=lambda table: table.__name__)
+def test_every_key_of_a_structure_is_known_to_keep_its_symmetry_or_to_break_it(table: Any) -> None:
+    """A new key has to be decided on in `is_symmetric`; what a section says is in its two matrices."""
+    assert set(table.model_fields) == KNOWN[table]
 
 
 def test_stability_under_constant_conditions_is_that_in_all_directions() -> None:

@@ -86,7 +86,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
     beam = body.block("timoschenko_input")
     which, full = beam.command("set"), beam.find("fpm")
     st = _named_file(beam.command("filename"), deck)
-    table = _table(st, [which.whole(2), which.whole(3)], None if full is None else bool(full.whole(2)))
+    table = _table(st, [which.number(2), which.number(3)], None if full is None else bool(full.number(2)))
     if abs(table["r"][-1] / through.length - 1.0) > 1e-2:  # r often counts along a straight axis
         which.fail(f"its sections end at r = {table['r'][-1]:g} m, and the line of c2_def at {through.length:g} m")
     if abs(table["r"][-1] / through.length - 1.0) > DIGITS:
@@ -129,7 +129,7 @@ def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array
         allowed = ", or ".join(f"{number} {kinds[number]}" for number in known)
         deck.fail(f"has {columns} columns; must be {allowed}" + ("" if full is None else f", as FPM {full:d}"), first)
     table = deck.table(first, count, known[columns], POSITIVE)
-    deck.increasing(table["r"], first, what="r")
+    deck.increasing(table["r"], range(first, first + count), what="r")
     for i, matrix in enumerate(_matrices(table)["stiffness"] if "K11" in table else ()):
         if not is_positive(matrix):
             deck.fail("the stiffness matrix is not positive definite", first + i)
@@ -226,13 +226,6 @@ class Command:
             self.fail(f"has {len(self.words)} columns; {self.words[0]} has a number in column {column}")
         return self.deck.value(self.words[column - 1], self.line, column)
 
-    def whole(self, column: int) -> int:
-        """Return a word as a whole number."""
-        number = self.number(column)
-        if number != int(number):
-            self.fail(f"{number:g} must be a whole number", column)
-        return int(number)
-
     @property
     def name(self) -> str:
         """What `begin` says."""
@@ -292,12 +285,12 @@ def _c2_def(body: Command) -> tuple[list[list[float]], Command]:
     """Return rows (x, y, z in m, twist in degrees) of a body's line, and the command that says how many there are."""
     block = body.block("c2_def")
     head = block.command("nsec")
-    count = head.whole(2)
+    count = int(head.number(2))
     sections = block.all("sec")
     if count < 2 or len(sections) != count:
         head.fail(f"nsec is {count}, at least 2, and there are {len(sections)} lines of sec", 2)
     for number, section in enumerate(sections, start=1):
-        if section.whole(2) != number:
+        if section.number(2) != number:
             section.fail(f"must be section {number}, not {section.words[1]}", 2)
         if len(section.words) != 6:
             section.fail(f"has {len(section.words)} columns; must be sec, its number, x, y, z and twist")
