@@ -63,7 +63,7 @@ class FirstMotion:
         if len(spinning.pairs.values) < number:
             raise InputError("initial.mode", number, f"there are {len(spinning.pairs.values)} modes")
         structure, value = system.structure, spinning.pairs.values[number - 1]
-        x = analysis.right(spinning)[:, number - 1]
+        x = spinning.right[:, number - 1]
         whole = with_ghosts(system.V, x.real) + 1j * with_ghosts(system.V, x.imag)
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
         tip = structure.tip_values(whole)[moves]
@@ -72,7 +72,7 @@ class FirstMotion:
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
         factor = self.amplitude * np.exp(1j * self.phase)
         signal = np.array([(value**k * factor * whole / largest).real for k in range(4)])
-        shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
+        shape, mass = (x / largest, spinning.mass_right[:, number - 1] / largest)
         energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
         return signal, np.array([mass.real, mass.imag])[energies > 1e-2 * energies.sum()]
 

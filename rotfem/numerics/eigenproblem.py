@@ -215,6 +215,15 @@ class Eigenpairs:
         return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
 
 
+def backward_errors(pencil: Pencil, values: Array, X: Array) -> Array:
+    """Return the normwise backward errors of eigenpairs, ‖(λ² M + λ C + K) x‖ / [(|λ|² ‖M‖ + |λ| ‖C‖ + ‖K‖) ‖x‖]."""
+    matrices, powers = (pencil.M, pencil.C, pencil.K), np.array([values**2, values, np.ones_like(values)])
+    residual = sum(power * pencil.apply(A, X) for A, power in zip(matrices, powers, strict=True))
+    norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in matrices])
+    squares = summed(pencil.comm, np.array([np.sum(np.abs(Y) ** 2, axis=0) for Y in (residual, X)]))
+    return np.asarray(np.sqrt(squares[0] / squares[1]) / (norms @ np.abs(powers)))
+
+
 def basis_of(wanted: int, unknowns: int) -> int:
     """Return how many vectors the basis of SLEPc's solver has for so many eigenvalues of 2n, n the unknowns."""
     return min(max(3 * wanted, wanted + 20), 2 * unknowns)
