@@ -10,12 +10,12 @@ import pytest
 import rotfem
 from rotfem import run
 from rotfem.commands.problem import Problem
+from rotfem.mechanics.problem import inactive_unknowns
 from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.root import SpatialRoot, SupportTable
-from rotfem.structures.symmetry import inactive_unknowns
 
 BEAM: dict[str, Any] = {
     "type": "spatial_beam",
