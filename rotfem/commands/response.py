@@ -107,7 +107,7 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
 
     The equilibrium is left in the system.
     """
-    system, motion = analysis.system.held, analysis.system.held.motion.at_speed(spinning.speed)
+    system, motion = analysis.system, analysis.system.motion.at_speed(spinning.speed)
     forces, held, moments, q = [], [], list[Any](), spinning.q
     if system.linear and analysis.about == "steady":  # a load prestresses what is displaced
         q = steady_state(system, spinning.speed, analysis.newton, notes=[])

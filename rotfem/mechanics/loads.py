@@ -313,7 +313,7 @@ def _harmonic(given: Any, angle: Callable[[float], float]) -> Term:
 
     def at(t: Array) -> Array:
         turned = t if given.per_rev is None else np.array([angle(float(s)) for s in t])
-        return np.cos(rate * turned + given.phase)[:, None]
+        return np.asarray(np.cos(rate * turned + given.phase)[:, None])
 
     return Term(shapes, at, linear=False, largest=np.ones(1), phase=given.phase)
 

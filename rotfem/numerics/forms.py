@@ -10,7 +10,9 @@ import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
+from basix.ufl import element
 from dolfinx import cpp, fem, la
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives, extract_coefficients
@@ -130,6 +132,17 @@ def add_vector(b: npt.NDArray[np.float64], form: Any) -> None:
     """Add a compiled linear form to a local dof array."""
     code = form._cpp_object
     cpp.fem.assemble_vector(b, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code))
+
+
+def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:
+    """Return a linear form as a PETSc vector (b if given, overwritten), zero at clamped unknowns."""
+    b = compat.create_vector(V) if b is None else b
+    with b.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(b, form)
+    b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+    b.array[clamped] = 0.0
+    return b
 
 
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or
@@ -294,3 +307,37 @@ def added(parts: Iterable[Any]) -> Any:
 def weighted(factors: Iterable[Any], parts: Iterable[Any]) -> ufl.Form:
     """Return the sum of UFL forms, each times a scalar."""
     return ufl.Form([c * integral for c, form in zip(factors, parts, strict=True) for integral in form.integrals()])
+
+
+class Functionals:
+    """Values of functionals, name ↦ UFL form, compiled as one form with a constant in every cell for each of them.
+
+    Common subexpressions are computed once.
+    """
+
+    def __init__(self, parts: dict[str, Any], mesh: Any):
+        self.names, self.comm = tuple(parts), mesh.comm
+        if not parts:
+            return
+        constant = element("DG", mesh.basix_cell(), 0, shape=(len(parts),))
+        self._V = fem.functionspace(mesh, constant)  # which must outlast its array
+        which = ufl.TestFunction(self._V)
+        integrals = [
+            integral.reconstruct(which[i] * integral.integrand())
+            for i, part in enumerate(parts.values())
+            for integral in part.integrals()
+        ]
+        self._form = form(ufl.Form(integrals))
+        cells = self._V.dofmap.index_map
+        self._of_cells = np.zeros((cells.size_local + cells.num_ghosts, len(parts)))
+
+    def __call__(self) -> dict[str, float]:
+        """Return their values over all ranks, at what their forms are evaluated at."""
+        if not self.names:
+            return {}
+        self._of_cells.fill(0.0)
+        add_vector(self._of_cells.reshape(-1), self._form)
+        values = self._of_cells.sum(axis=0)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
+        return dict(zip(self.names, values.tolist(), strict=True))
