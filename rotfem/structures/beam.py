@@ -20,7 +20,7 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, RootSpring, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
-from rotfem.structures.meshes.plate_mesh import beam_nodes, boundary_tags
+from rotfem.structures.mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative

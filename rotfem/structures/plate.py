@@ -26,7 +26,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
-from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
+from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import ModeName, Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
