@@ -135,7 +135,9 @@ structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
 structure.section.EA=nofile.csv -> file not found
 time={end=1.0, step=1e-20} -> @time.step round-off
+structure.section.from='x.dat' -> only of a spatial_beam
 [spatial]
+structure.section.format='hawc2' -> no meaning without section.from
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
 structure.pretwist=[[0,0],[1,1]] -> it ends at 1
