@@ -89,6 +89,7 @@ time={end=1.0, step=0.1, beta=0.3} -> @time.beta no meaning
 time={end=1.0, step=0.1, scheme='newmark', gamma=0.4} -> @time.gamma at least 0.5
 time={end=1.0, step=0.1, scheme='newmark', beta=0} -> @time.beta greater than 0
 time={end=1.0, step=0.1, output_every=0} -> @time.output_every at least 1
+time={end=1.0, step=0.1, scheme='rk4'} -> @time.scheme "generalised_alpha", "newmark", "energy_conserving", "esdirk4"
 modes.count=0 -> at least 1
 modes.about='deformed' -> "undeformed"
 structure.section.EA=[] -> at least two rows
