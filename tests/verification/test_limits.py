@@ -22,8 +22,8 @@ from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import smooth_spin_up
-from rotfem.mechanics.theories import ladder
 from rotfem.numerics.newton import Newton
+from rotfem.registry import theories
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 
@@ -236,7 +236,7 @@ def test_weight_of_beam_and_tip_mass(unit_beam: Any) -> None:
 # --- rotation --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ladder())
+@pytest.mark.parametrize("theory", theories.names)
 @pytest.mark.parametrize(
     ("row", "speed", "expected"),
     [
@@ -302,7 +302,7 @@ def test_consistent_linearisation_of_a_stiff_rod(unit_beam: Any, linear: str, no
 
 def test_no_spin_is_a_common_cantilever(unit_beam: Any) -> None:
     """First frequency of the thin cantilever at rest in every theory: 3.516015 (any text), less a few r²/L²."""
-    for theory in ladder():
+    for theory in theories.names:
         omega, _ = first_mode(Problem.of(unit_beam(slender(1e-3) | {"model.theory": theory})).system())
         assert omega == pytest.approx(3.516015, rel=1e-5)
 

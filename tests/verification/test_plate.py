@@ -16,7 +16,7 @@ import rotfem
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.commands.problem import Problem
 from rotfem.errors import SceneError
-from rotfem.mechanics.theories import ladder
+from rotfem.registry import theories
 from rotfem.scene import Scene
 from tests.plate_mesh_files import grid, write_msh
 
@@ -462,7 +462,7 @@ def test_reduced_basis(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(row["residual"] for row in quick.rows) < 1e-6
 
 
-@pytest.mark.parametrize("theory", [theory for theory in ladder() if theory != "linear"])
+@pytest.mark.parametrize("theory", [theory for theory in theories.names if theory != "linear"])
 def test_modes_in_the_plane_are_those_of_the_beam(theory: str) -> None:
     """A strip that spins about its normal three times as fast as it flaps first: the planar beam of its section.
 

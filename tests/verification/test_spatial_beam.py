@@ -21,8 +21,7 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.sensitivity import sensitivities
 from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
-from rotfem.mechanics.theories import ladder
-from rotfem.registry import effects
+from rotfem.registry import effects, theories
 from tests.beams import STRUCTURE
 
 pytestmark = pytest.mark.usefixtures("unestimated")
@@ -623,7 +622,7 @@ DAMPED = {"structure.damping": {"kelvin_voigt": 0.01, "rayleigh": [0.3, 0.02]}}
 #: Kind of beam ↦ theory and what it has beside every effect and load. Of the exact theory dampers and masses are apart:
 #: they share no term, and one kernel with both compiles twice as long as these two.
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
-    **{theory: (theory, DAMPED) for theory in ladder()},
+    **{theory: (theory, DAMPED) for theory in theories.names},
     "consistent_linear": ("consistent_linear", DAMPED | REST),
     "reissner with masses": ("reissner", {"structure.damping": {"rayleigh": [0.3, 0.0]}} | REST),
 }
@@ -659,7 +658,7 @@ def balanced(system: System, speed: float) -> Array:
     raise AssertionError("no equilibrium")
 
 
-@pytest.mark.parametrize("kind", [*(t for t in ladder() if t != "reissner"), *EXACT])
+@pytest.mark.parametrize("kind", [*(t for t in theories.names if t != "reissner"), *EXACT])
 def test_symmetries_about_a_deformed_steady_state(everything: Callable[[str], System], kind: str) -> None:
     """Without damping and with dead loads alone, those of t = 0; about a skew axis."""
     system = everything(kind)
