@@ -1,4 +1,4 @@
-"""The time grid: jumps of functions, parts from knot to knot, and straight lines over what is denser."""
+"""The time grid: jumps of functions, legs from knot to knot, and straight lines over what is denser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError, run
-from rotfem.analysis.time_grid import FEW, find_jumps, intervals, knots_of
+from rotfem.analysis.time_grid import find_jumps
 from rotfem.mechanics.time_signals import TimeSignal
 from tests.beams import STRUCTURE
 
@@ -33,21 +33,6 @@ def test_a_jump_is_found_to_round_off(at: float) -> None:
 @pytest.mark.parametrize("f", [lambda t: np.sin(7 * t), lambda t: abs(t - 0.5033), lambda t: np.sqrt(t), lambda t: 2.0])
 def test_what_is_continuous_has_no_knots(f: Any) -> None:
     assert len(searched(f).knots) == 0
-
-
-def test_steps_have_parts_from_knot_to_knot_or_one_with_a_line() -> None:
-    """Up to FEW knots are landed on, more are not; a knot at the end of a step makes no leg of its own."""
-    few, many = np.linspace(0.11, 0.19, FEW), np.linspace(0.31, 0.39, FEW + 1)
-    signal = TimeSignal("a", lambda t: t, np.concatenate([few, [0.3], many]))
-    times = np.linspace(0.0, 0.5, 6)
-    knots = knots_of([signal], times)
-    parts = list(intervals(knots, times, 0.1, divided=True))
-    np.testing.assert_allclose([part.end for part in parts], [0.1, *few, 0.2, 0.3, 0.4, 0.5], rtol=1e-12)
-    assert [part.at_knot for part in parts] == [False, *FEW * [True], False, True, False, False]
-    assert [part.whole for part in parts] == [True, *FEW * [False], *4 * [True]]
-    assert [part.line for part in parts] == [*(FEW + 3) * [None], pytest.approx((0.3, 0.4, 1)), None]
-    whole = list(intervals(knots, times, 0.1, divided=False))
-    assert [part.line is not None for part in whole] == [False, True, False, True, False]
 
 
 @pytest.mark.parametrize("degree", [1, 3])
