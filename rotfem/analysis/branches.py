@@ -334,10 +334,6 @@ class Sweep:
         beside = [s for s in points if s.speed < left.speed][-1:] + [s for s in points if s.speed > right.speed][:1]
         return between((left, right), beside)
 
-    def found(self) -> list[float]:
-        """Return all frequencies of the branches, rad/s."""
-        return [point.value(b).imag for point in self.points for b in range(self.count)]
-
     # --- what the diagram says ----------------------------------------------------------------------------------------
 
     def wave(self, point: SpeedPoint, branch: int) -> Wave | None:
