@@ -203,7 +203,7 @@ def diagram(
         "speeds": len(values),
         "speeds_inserted": sweep.inserted,
         "speeds_solved": sweep.solves,
-        "checks": self_checks(analysis, last.spinning),
+        "checks": self_checks(last.spinning),
         "lowest_frequency": min((row["frequency"] for row in rows if row["frequency"] > 0), default=0.0),
         "warnings": warnings,
         "advice": hints,
