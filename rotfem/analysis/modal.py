@@ -151,16 +151,6 @@ class Spinning:
         """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs, with the `nonzero` λ."""
         return self.pencil.gram(self.pairs.left, self.nonzero, self.pairs.right, self.nonzero)
 
-    def modal_basis(self, count: int) -> Spinning:
-        """Return it with the pairs that motions are sums of: of its first modes those that are not zero to round-off.
-
-        With the growing one of two real λ and −λ of a conservative pencil comes the other: P(−λ) is P(λ)ᵀ.
-        """
-        pairs = self.pairs.select(np.flatnonzero(self.pairs.bounds[:count] < 1.0))
-        real = pairs.select(np.flatnonzero((pairs.values.imag == 0.0) & self.pencil.conservative))
-        other = Eigenpairs(-real.values, real.left, real.right, real.errors, real.bounds)
-        return replace(self, pairs=pairs.joined(other), described=None)
-
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
         return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)
@@ -183,7 +173,6 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
-        estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
     """
@@ -207,7 +196,6 @@ class ModalAnalysis:
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)
         self.notes = list[str]()
-        self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}

@@ -156,10 +156,10 @@ def diagram(
             kept.save(sweep.points)
         if len(sweep.points) < 2:
             raise
-        stopped, sweep.only, analysis.estimates = stop, True, False
+        stopped, sweep.only = stop, True
         orders, crossings, onsets = meetings(sweep, marks.orders)
     labels, last = branch_labels(analysis, sweep), sweep.points[-1]
-    errors = branch_errors(scene, analysis, sweep) if analysis.estimates else None
+    errors = branch_errors(scene, analysis, sweep) if scene.output.error and stopped is None else None
     mesh = None if errors is None else errors.each
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)

@@ -172,7 +172,6 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm, counted: boo
     """Return the modal analysis that a scene asks for, of a small system each process for itself."""
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
     analysis.everyone = comm
-    analysis.estimates = scene.output.error
     if counted and "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis
