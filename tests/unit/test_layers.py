@@ -181,8 +181,8 @@ def test_a_plain_run_loads_what_it_uses() -> None:
 
 def test_an_import_from_above_is_seen() -> None:
     """The test can fail: what the command line imports is not allowed for the ground."""
-    assert any(package(name) == "commands" for name in own("commands.cli"))
-    assert "commands.modes" in own("commands.cli") - own("commands.cli", everywhere=False)
+    assert any(package(name) == "commands" for name in own("commands.verbs"))
+    assert "commands.modes" in own("commands.verbs") - own("commands.verbs", everywhere=False)
 
 
 def test_a_comparison_with_a_name_or_a_class_is_seen() -> None:
