@@ -26,8 +26,7 @@ CAPABILITIES = {
         accuracy commands.answers commands.cost commands.explain results.distance
     """,
     "time integration": """
-        analysis.dense_output analysis.first_motion analysis.march analysis.runge_kutta analysis.schemes
-        analysis.stepper analysis.time_grid equations.energy_balance
+        analysis.dense_output analysis.first_motion analysis.march analysis.schemes analysis.time_grid
     """,
     "loads": "mechanics.loads scene.load structures.applied_loads structures.plate_loads",
     "modes and other analyses": "analysis",

@@ -19,10 +19,9 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from rotfem import registry
-from rotfem.scene import beams, loads, motion, plates, root, section, settings
+from rotfem.scene import beams, loads, motion, plates, section, settings, structure
 from rotfem.scene.extensions import Extensions
 from rotfem.scene.scene import Scene
-from rotfem.scene.structure import Damping
 from rotfem.scene.table import SceneModel
 from rotfem.scene.values import padded, parameters_of
 
@@ -64,24 +63,28 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ("`[structure.section]` of a spatial beam", section.SpatialSection, ""),
     (
         "`[structure.damping]`",
-        Damping,
+        structure.DampingTable,
         "toml\n[structure.damping]\nkelvin_voigt = 1e-4\nmodal = [0.0048, 0.0048, 0.006]",
     ),
-    ("`[structure.root]` of a planar beam", root.Root, "toml\n[structure.root]\nlag_stiffness = 5e4\nlag_damping = 20"),
+    (
+        "`[structure.root]` of a planar beam",
+        structure.Root,
+        "toml\n[structure.root]\nlag_stiffness = 5e4\nlag_damping = 20",
+    ),
     (
         "`[structure.root]` of a spatial beam",
-        root.SpatialRoot,
+        structure.SpatialRoot,
         "toml spatial\n[structure.root]\nflap_stiffness = 0\nlag_stiffness = 0\nhinge_offset = 0.3\npitch = '8 deg'",
     ),
     (
         "`structure.root.pitch` as a table",
-        root.PitchAngle,
+        structure.PitchAngle,
         "toml spatial\n[structure.root.pitch]\nvalue = '8 deg'\n"
         "harmonic = [{ amplitude = '3 deg', per_rev = 1, phase = '90 deg' }]",
     ),
     (
         "`[[structure.supports]]`",
-        root.Support,
+        structure.SupportTable,
         "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
         "root = { driven = true }\nsupports = [{ x = 0, stiffness = 1e6, damping = 200 }, { x = 10, stiffness = 1e6 }]",
     ),
@@ -90,7 +93,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
         beams.PointMass,
         "toml spatial\n[[structure.masses]]\nx = 4.0\nmass = 2.0\noffset = [0, 0.1]\ninertia = 0.02",
     ),
-    ("`[motion]`, of every type", motion.Motion, ""),
+    ("`[motion]`, of every type", motion.MotionTable, ""),
     ('`[motion]`, `type = "constant"`', motion.ConstantMotion, "toml\n[motion]\ntype = 'constant'\nspeed = '12.1 rpm'"),
     (
         '`[motion]`, `type = "spin_up"`',
@@ -112,7 +115,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ('`[motion]`, `type = "callable"`', motion.CallableMotion, ""),
     (
         "`[model]`",
-        settings.Model,
+        settings.ModelTable,
         "toml\n[model]\ntheory = 'consistent_linear'\neffects = ['coriolis', 'centrifugal', 'euler']",
     ),
     (
@@ -122,11 +125,11 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ),
     (
         "`[loads]`",
-        loads.Loads,
+        loads.LoadsTable,
         "toml\n[loads]\ntip_force = { over_time = [[0, 0, 0], [0.1, 0, 50]], kind = 'follower' }\n"
         "distributed_moment = { over_span = [[0, 0], [10, 0.4]] }\n[time]\nend = 1.0\nstep = 0.01",
     ),
-    ("A load", loads.Load, "toml\n[loads.tip_force]\nvalue = [0, 20]\nkind = 'dead'"),
+    ("A load", loads.LoadTable, "toml\n[loads.tip_force]\nvalue = [0, 20]\nkind = 'dead'"),
     (
         "A load over the span",
         loads.SpanLoad,
@@ -146,7 +149,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ("`[mesh]` of a beam", settings.BeamMesh, "toml\n[mesh]\nelements = 8\ndegree = 3"),
     ("`[mesh]` of a plate", settings.PlateMesh, "toml plate\n[mesh]\nelements = [16, 4]\ncell = 'triangle'"),
     ("`[time]`", settings.Time, "toml\n[time]\nend = 20.0\ntolerance = 1e-4\nscheme = 'esdirk4'\noutput_step = 0.02"),
-    ("`[modes]`", settings.Modes, "toml\n[modes]\ncount = 8\nabout = 'steady'"),
+    ("`[modes]`", settings.ModesTable, "toml\n[modes]\ncount = 8\nabout = 'steady'"),
     ("`[solver]`", settings.Solver, "toml\n[solver]\nmax_iterations = 50"),
     (
         "`[output]`",
@@ -189,7 +192,7 @@ def kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     if origin is typing.Literal:
         return ", ".join(f'`"{name}"`' for name in arguments)
     if isinstance(annotation, type) and issubclass(annotation, SceneModel):
-        name = re.sub("([a-z])([A-Z])", r"\1 \2", annotation.__name__).lower()
+        name = re.sub("([a-z])([A-Z])", r"\1 \2", annotation.__name__.removesuffix("Table")).lower()
         return name if issubclass(annotation, loads.Given) else "table"
     if origin in (typing.Union, UnionType):
         return ", ".join(dict.fromkeys(kind(a) for a in arguments if a is not NoneType))

@@ -19,7 +19,7 @@ from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.accuracy.cost import CostResult as CostResult
-    from rotfem.analysis.runge_kutta import ESDIRK4 as ESDIRK4
+    from rotfem.analysis.schemes import ESDIRK4 as ESDIRK4
     from rotfem.analysis.schemes import GeneralisedAlpha as GeneralisedAlpha
     from rotfem.analysis.schemes import Newmark as Newmark
     from rotfem.analysis.schemes import Scheme as Scheme
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from rotfem.scene.blades.deck import Asked as Asked
     from rotfem.scene.blades.deck import BladeFormat as BladeFormat
     from rotfem.scene.blades.deck import Deck as Deck
-    from rotfem.scene.loads import Loads as Loads
+    from rotfem.scene.loads import LoadsTable as Loads
     from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry as Geometry
     from rotfem.scene.section_shapes import Shape as Shape

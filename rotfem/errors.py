@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 _LONGEST_VALUE, _MOST_PROBLEMS = 72, 20
 
 
-class Problem(NamedTuple):
+class Fault(NamedTuple):
     """One thing wrong with a scene.
 
     Attributes:
@@ -48,7 +48,7 @@ class InputError(ValueError):
         self.key, self.value, self.allowed = key, value, allowed
 
     def __str__(self) -> str:
-        return str(Problem(self.key, self.value, self.allowed))
+        return str(Fault(self.key, self.value, self.allowed))
 
 
 @contextmanager
@@ -74,7 +74,7 @@ class SceneError(InputError):
     """
 
     def __init__(
-        self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Problem] = ()
+        self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Fault] = ()
     ) -> None:
         super().__init__(key, value, allowed)
         self.file, self.others = file, tuple(others)
@@ -82,9 +82,9 @@ class SceneError(InputError):
         self.args = (file, key, value, allowed, self.others)
 
     @property
-    def problems(self) -> tuple[Problem, ...]:
+    def problems(self) -> tuple[Fault, ...]:
         """All problems, the first one first."""
-        return (Problem(self.key, self.value, self.allowed), *self.others)
+        return (Fault(self.key, self.value, self.allowed), *self.others)
 
     def __str__(self) -> str:
         first, *others = self.problems

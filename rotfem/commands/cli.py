@@ -65,12 +65,10 @@ def import_(
     It may be of BeamDyn, ElastoDyn, OpenFAST, BModes, HAWC2 or windIO.
     """
     from rotfem.commands.import_blade import import_blade, write_imported
-    from rotfem.scene.files import noted_files
 
     with Session(quiet=quiet, debug=debug) as session:
-        with noted_files() as inputs:
-            scene = import_blade(file, kind, overrides or ())
-        session.check_writable("-o", output, inputs)
+        scene = import_blade(file, kind, overrides or ())
+        session.check_writable("-o", output, scene.inputs)
         if session.first:
             write_imported(scene, file, output)
         for line in () if quiet else scene.hints:

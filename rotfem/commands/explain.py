@@ -197,7 +197,7 @@ class Explanation:
         if key not in self._systems:
             system = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
             if system.linear:
-                system.held.check_terms()
+                system.check_terms()
             self._systems[key] = system
         self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
         return self._systems[key]
@@ -313,17 +313,16 @@ class Explanation:
 
 def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
     """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
-    held = system.held
-    if held.linear:
+    if system.linear:
         return compute()
-    held.plain = True
+    system.plain = True
     try:
         return compute()
     except ComputationError:
-        held.plain = False
+        system.plain = False
         return compute()
     finally:
-        held.plain = True
+        system.plain = True
 
 
 def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
@@ -406,11 +405,11 @@ def groups(of: Explanation) -> dict[str, float]:
 
 def _frequencies_at_rest(of: Explanation) -> Array:
     """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
-    held = of.system.held
-    held.set_time(0.0, of.problem.motion.at_speed(0.0))
-    held.set_state(held.zeros())
+    system = of.system
+    system.set_time(0.0, of.problem.motion.at_speed(0.0))
+    system.set_state(system.zeros())
     try:
-        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.scene.modes.count)).resolved))
+        return np.sort(np.abs(Pencil(*system.mass_damping_stiffness()).solve(max(2, of.scene.modes.count)).resolved))
     except ComputationError:
         return np.empty(0)
 

@@ -76,7 +76,6 @@ def modes(
                 row |= mass
         return found
 
-    scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
             return compute(scene)
@@ -109,7 +108,6 @@ def _mesh_of(analysis: ModalAnalysis) -> tuple[Any, int]:
 
 def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
     """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one."""
-    scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
             return compute(scene)

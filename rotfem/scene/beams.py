@@ -15,9 +15,8 @@ from rotfem.scene.blades.deck import Asked, keys_of
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
-from rotfem.scene.structure import Damping, StructureTable, check_one_hub
+from rotfem.scene.structure import DampingTable, Hinge, Root, SpatialRoot, StructureTable, SupportTable, check_one_hub
 from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
     DIGITS,
@@ -95,7 +94,7 @@ class BeamStructure(StructureTable):
     hub_radius: Length = 0.0
     tip_mass: Mass = 0.0
     masses: tuple[PointMass, ...] = ()
-    damping: Damping = empty()
+    damping: DampingTable = empty()
 
     if TYPE_CHECKING:
         section: PlanarSection | SpatialSection
@@ -219,7 +218,7 @@ class SpatialBeamStructure(BeamStructure):
     line: Line | None = None
     precone: Annotated[Number, unit("rad")] = 0.0
     root: SpatialRoot = empty()
-    supports: tuple[Support, ...] = ()
+    supports: tuple[SupportTable, ...] = ()
 
     @property
     def reference_line(self) -> ReferenceLine | SweptLine | None:

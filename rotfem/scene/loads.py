@@ -8,14 +8,11 @@ from __future__ import annotations
 import inspect
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, field_validator
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationInfo, field_validator
 
-from rotfem.errors import SceneError
 from rotfem.scene.files import is_path, read_rows
 from rotfem.scene.table import LISTED, SceneModel, in_units, problem, problems_at, unit
 from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, on_span
@@ -44,73 +41,14 @@ def function_of(what: str, count: int = 1) -> BeforeValidator:
 
 TimeFunction = Annotated[Callable[[float], Any], function_of("the time t (s)")]
 
-#: A table, or a function in its place.
-Over: TypeAlias = Matrix | Callable[..., Any]
-
-
-@cache
-def _numbers(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
+#: What reads components, and rows, before their numbers are counted.
+_VECTOR = TypeAdapter(tuple[Number, ...], config=ConfigDict(defer_build=True))
+_ROWS = TypeAdapter(Rows, config=ConfigDict(defer_build=True))
 
 
 def are_rows(value: Any) -> bool:
-    """Return whether a value is a list of lists."""
-    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], list | tuple)
-
-
-@dataclass(frozen=True)
-class Kind:
-    """What the vectors of a signal are.
-
-    Attributes:
-        unit: of their components.
-        sizes: numbers of components that are allowed.
-        padded: number of components that vectors are filled up to with zeros.
-    """
-
-    unit: str
-    sizes: tuple[int, ...]
-    padded: int = 0
-
-    def vector(self, value: Any) -> tuple[float, ...]:
-        """Return components; raise if they are none. A number will do where one is allowed."""
-        value = in_units(value, [self.unit])
-        one = 1 in self.sizes and not isinstance(value, list | tuple)
-        if not one and not isinstance(value, list | tuple):
-            raise problem("", value, f"must be a list of {self._sizes} numbers")
-        return self._filled(_numbers(tuple[Number, ...]).validate_python([value] if one else value))
-
-    def rows(self, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
-        """Return rows (what they are over, components), or the function of the same that stands in their place."""
-        if callable(value):
-            if arguments(value) != len(over):
-                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
-                needed = f"f({', '.join(over).replace('x', places)})"
-                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
-            function: Callable[..., Any] = value
-            return function
-        given = in_units(read_rows(value, info), [self.unit], [OVER_UNITS[name] for name in over])
-        n, table = len(over), _numbers(Rows).validate_python(given)
-        for i, row in enumerate(table, start=1):
-            if len(row) != len(table[0]) or len(row) - n not in self.sizes:
-                shape = f"rows [{', '.join(over)}, …] of {self._sizes} components each"
-                raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries")
-        return tuple((*row[:n], *self._filled(row[n:])) for row in CHECKS[over](table))
-
-    @property
-    def _sizes(self) -> str:
-        return " or ".join(map(str, self.sizes))
-
-    def _filled(self, vector: tuple[float, ...]) -> tuple[float, ...]:
-        if len(vector) not in self.sizes:
-            raise problem("", list(vector), f"must be a list of {self._sizes} numbers")
-        return (*vector, *(0.0,) * (self.padded - len(vector)))
-
-
-ACCELERATION = Kind("m/s**2", (2, 3), padded=3)
-FORCE = Kind("N", (2, 3), padded=3)
-MOMENT = Kind("N*m", (1, 3))
-PRESSURE = Kind("Pa", (1,))
+    """Return whether a value is a list of lists, or the path of a file of rows."""
+    return is_path(value) or (isinstance(value, list | tuple) and bool(value) and isinstance(value[0], list | tuple))
 
 
 def check_span(rows: Matrix) -> Matrix:
@@ -154,6 +92,10 @@ OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_an
 OVER_UNITS = {"t": "s", "x": "m"}
 
 
+#: "dead" loads keep their direction in the rotating frame, "follower" loads turn with the section.
+Kind = Literal["dead", "follower"]
+
+
 class Harmonic(SceneModel):
     """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
 
@@ -181,7 +123,7 @@ class Given(SceneModel):
     """
 
     #: Its keys of which exactly one is given.
-    WAYS: ClassVar[tuple[str, ...]]
+    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -193,9 +135,7 @@ class Given(SceneModel):
         if isinstance(data, Mapping):
             one = isinstance(data.get("harmonic"), Mapping | Harmonic)
             return {**data, "harmonic": [data["harmonic"]]} if one else data
-        if callable(data):
-            return {"function": data}
-        return {"table" if are_rows(data) or is_path(data) else "value": data}
+        return {"function" if callable(data) else "table" if are_rows(data) else "value": data}
 
     def _check(self) -> None:
         harmonic = getattr(self, "harmonic", None)
@@ -214,26 +154,57 @@ class Signal(Given):
         function: Python function t (s) ↦ components, or None.
     """
 
-    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
-    VECTORS: ClassVar[Kind] = ACCELERATION
+    #: Numbers of components that are allowed, and their unit.
+    SIZES: ClassVar[tuple[int, ...]] = (2, 3)
+    UNIT: ClassVar[str] = "m/s**2"
 
     value: tuple[float, ...] | None = None
     table: Matrix | None = None
     function: TimeFunction | None = None
 
-    @field_validator("value", mode="plain")
+    @field_validator("value", *OVER, mode="plain", check_fields=False)
     @classmethod
-    def _read_value(cls, value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
-        return None if value is None else cls._kind(info).vector(value)
-
-    @field_validator(*OVER, mode="plain", check_fields=False)
-    @classmethod
-    def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls._kind(info).rows(OVER[str(info.field_name)], value, info)
+    def _read_given(cls, value: Any, info: ValidationInfo) -> Any:
+        over = OVER.get(str(info.field_name))
+        return value if value is None else cls._rows(over, value, info) if over else cls._vector(value, info)
 
     @classmethod
-    def _kind(cls, info: ValidationInfo) -> Kind:
-        return cls.VECTORS
+    def _unit(cls, info: ValidationInfo) -> str:
+        return cls.UNIT
+
+    @classmethod
+    def _vector(cls, value: Any, info: ValidationInfo) -> tuple[float, ...]:
+        """Return components; a number will do where one is allowed."""
+        value = in_units(value, [cls._unit(info)])
+        if not isinstance(value, list | tuple):
+            if 1 not in cls.SIZES:
+                raise problem("", value, f"must be a list of {_either(cls.SIZES)} numbers")
+            value = [value]
+        return cls._filled(_VECTOR.validate_python(value))
+
+    @classmethod
+    def _rows(cls, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Any:
+        """Return rows (what they are over, components), or the function of the same that stands in their place."""
+        if callable(value):
+            if arguments(value) != len(over):
+                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
+                needed = f"f({', '.join(over).replace('x', places)})"
+                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
+            return value
+        given = in_units(read_rows(value, info), [cls._unit(info)], [OVER_UNITS[name] for name in over])
+        n, table = len(over), _ROWS.validate_python(given)
+        for i, row in enumerate(table, start=1):
+            if len(row) != len(table[0]) or len(row) - n not in cls.SIZES:
+                shape = f"rows [{', '.join(over)}, …] of {_either(cls.SIZES)} components each"
+                raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries")
+        return tuple((*row[:n], *cls._filled(row[n:])) for row in CHECKS[over](table))
+
+    @classmethod
+    def _filled(cls, vector: tuple[float, ...]) -> tuple[float, ...]:
+        """Return components, two with a third one, zero."""
+        if len(vector) not in cls.SIZES:
+            raise problem("", list(vector), f"must be a list of {_either(cls.SIZES)} numbers")
+        return (*vector, 0.0) if len(vector) == 2 else vector
 
     @property
     def over(self) -> tuple[tuple[str, ...], Any]:
@@ -242,19 +213,18 @@ class Signal(Given):
         return {"function": ("t",), **OVER}.get(name, ()), getattr(self, name)
 
     @property
-    def vectors(self) -> Iterator[tuple[float, ...]]:
-        """The value, or the rows without what they are over; none of a function."""
+    def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
+        """Place x (None: everywhere) and components of all vectors that it is given by; none of a function."""
         over, given = self.over
-        if isinstance(given, tuple):
-            yield from (row[len(over) :] for row in (given if over else [given]))
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether the third component of all vectors is zero."""
-        return not any(vector[2] for vector in self.vectors if len(vector) > 2)
+        for row in () if not isinstance(given, tuple) else given if over else [given]:
+            yield row[0] if "x" in over else None, row[len(over) :]
 
 
-class Load(Signal):
+def _either(sizes: tuple[int, ...]) -> str:
+    return " or ".join(map(str, sizes))
+
+
+class LoadTable(Signal):
     """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
 
     Attributes:
@@ -267,9 +237,9 @@ class Load(Signal):
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")
-    VECTORS: ClassVar[Kind] = FORCE
+    UNIT: ClassVar[str] = "N"
 
-    kind: Literal["dead", "follower"] = "dead"
+    kind: Kind = "dead"
     over_time: Any = None
     harmonic: tuple[Harmonic, ...] = ()
 
@@ -279,36 +249,30 @@ class Load(Signal):
         out = []
         for i, part in enumerate(given):
             with problems_at(f"{i}.amplitude", part.amplitude):
-                out.append(part.model_copy(update={"amplitude": cls._read_amplitude(part.amplitude, info)}))
+                out.append(part.model_copy(update={"amplitude": cls._amplitude(part.amplitude, info)}))
         return tuple(out)
 
     @classmethod
-    def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        return cls._kind(info).vector(value)
+    def _amplitude(cls, value: Any, info: ValidationInfo) -> Any:
+        return cls._vector(value, info)
 
     @property
-    def span_rows(self) -> Iterator[tuple[float, ...]]:
-        """All rows (x, components) of tables over the span, and over span and time."""
-        over, given = self.over
-        if "x" in over and isinstance(given, tuple):
-            yield from ((row[0], *row[len(over) :]) for row in given)
-        yield from (row for h in self.harmonic if isinstance(h.amplitude[0], tuple) for row in h.amplitude)
-
-    @property
-    def vectors(self) -> Iterator[tuple[float, ...]]:
-        """All vectors that are known of it: of the value, of tables and of harmonics."""
+    def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
+        """The same, with the amplitudes of harmonics."""
         yield from super().vectors
         for h in self.harmonic:
-            yield from (row[1:] for row in h.amplitude) if isinstance(h.amplitude[0], tuple) else (h.amplitude,)
+            spread = isinstance(h.amplitude[0], tuple)
+            yield from ((row[0], row[1:]) for row in h.amplitude) if spread else [(None, h.amplitude)]
 
 
-class MomentLoad(Load):
+class MomentTable(LoadTable):
     """A moment over time (N·m): one component, about axis 3, for a planar beam and three for a spatial one."""
 
-    VECTORS: ClassVar[Kind] = MOMENT
+    SIZES: ClassVar[tuple[int, ...]] = (1, 3)
+    UNIT: ClassVar[str] = "N*m"
 
 
-class SpanLoad(Load):
+class SpanLoad(LoadTable):
     """A force along the structure (N/m, or N/m² on a plate), which may vary over the span, over time, and over both.
 
     Attributes:
@@ -318,26 +282,24 @@ class SpanLoad(Load):
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "over_span", "over_time", "over_span_and_time", "table", "function")
-
-    VECTORS: ClassVar[Kind] = replace(FORCE, unit="N/m")
+    UNIT: ClassVar[str] = "N/m"
 
     over_span: Any = None
     over_span_and_time: Any = None
 
     @classmethod
-    def _kind(cls, info: ValidationInfo) -> Kind:
-        on_plate = cls is SpanLoad and (info.context or {}).get("type") == "plate"
-        return replace(FORCE, unit="N/m**2") if on_plate else cls.VECTORS
+    def _unit(cls, info: ValidationInfo) -> str:
+        return "N/m**2" if cls is SpanLoad and (info.context or {}).get("type") == "plate" else cls.UNIT
 
     @classmethod
-    def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        kind = cls._kind(info)
-        return kind.rows(("x",), value, info) if are_rows(value) or is_path(value) else kind.vector(value)
+    def _amplitude(cls, value: Any, info: ValidationInfo) -> Any:
+        return cls._rows(("x",), value, info) if are_rows(value) else cls._vector(value, info)
 
     @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+    def _table(cls, data: Any) -> Any:
         """Take a function of two arguments for one of place and time."""
-        given = data.get("function")
+        data = super()._table(data)
+        given = data.get("function") if isinstance(data, Mapping) else None
         if not callable(given) or arguments(given) != 2:
             return data
         return {**{key: value for key, value in data.items() if key != "function"}, "over_span_and_time": given}
@@ -352,7 +314,8 @@ class SpanLoad(Load):
 class SpanMoment(SpanLoad):
     """A moment per length of a beam (N): one component, about axis 3, for a planar beam and three for a spatial one."""
 
-    VECTORS: ClassVar[Kind] = replace(MOMENT, unit="N")
+    SIZES: ClassVar[tuple[int, ...]] = (1, 3)
+    UNIT: ClassVar[str] = "N"
 
 
 class Pressure(SpanLoad):
@@ -363,7 +326,8 @@ class Pressure(SpanLoad):
     """
 
     WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
-    VECTORS: ClassVar[Kind] = PRESSURE
+    SIZES: ClassVar[tuple[int, ...]] = (1,)
+    UNIT: ClassVar[str] = "Pa"
 
     regions: dict[str, Annotated[Number, unit("Pa")]] | None = None
 
@@ -383,16 +347,16 @@ class PointLoad(SceneModel):
     """
 
     x: Place
-    force: Load | None = None
-    moment: MomentLoad | None = None
-    kind: Literal["dead", "follower"] = "dead"
+    force: LoadTable | None = None
+    moment: MomentTable | None = None
+    kind: Kind = "dead"
 
     def _check(self) -> None:
         if self.force is None and self.moment is None:
             raise problem("force", None, "give force, moment, or both")
 
 
-class Loads(SceneModel):
+class LoadsTable(SceneModel):
     """The [loads] table.
 
     Attributes:
@@ -406,17 +370,17 @@ class Loads(SceneModel):
     """
 
     gravity: Annotated[PaddedVector, unit("m/s**2")] = (0.0, 0.0, 0.0)
-    tip_force: Load | None = None
-    tip_moment: MomentLoad | None = None
+    tip_force: LoadTable | None = None
+    tip_moment: MomentTable | None = None
     distributed: SpanLoad | None = None
     distributed_moment: SpanMoment | None = None
     pressure: Pressure | None = None
     at: tuple[PointLoad, ...] = ()
 
-    def named(self) -> Iterator[tuple[str, Load, str]]:
+    def named(self) -> Iterator[tuple[str, LoadTable, str]]:
         """Yield name, load and kind of all that are given: "tip_force", …, "at.0.force", "at.0.moment"."""
         for name in type(self).model_fields:
-            if isinstance(load := getattr(self, name), Load):
+            if isinstance(load := getattr(self, name), LoadTable):
                 yield name, load, load.kind
         for i, point in enumerate(self.at):
             for name, load in (("force", point.force), ("moment", point.moment)):
@@ -427,21 +391,21 @@ class Loads(SceneModel):
 # --- checks against what the loads work on ------------------------------------------------------------------------
 
 
-def check_loads(structure: Any, free_hub: bool, loads: Loads) -> None:
-    """Refuse loads that the structure cannot bear, and what a free hub does not have."""
+def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) -> None:
+    """Refuse loads that the structure cannot bear, and what a free hub or a scene without time does not have."""
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load, _ in loads.named():
         key = f"loads.{name}"
-        if load.VECTORS.sizes == MOMENT.sizes:
+        if name.endswith("moment"):
             _check_moment(key, structure, load)
-        for x, *_ in load.span_rows:
-            if not on_span(x, structure.length):
-                raise problem(
-                    key, None, f"x = {x:.10g} is not on the structure, which runs from 0 to {structure.length:g}"
-                )
+        if isinstance(load, SpanLoad) and load.table is not None:
+            _check_table(key, structure, load.table, timed)
+        for x in (x for x, _ in load.vectors if x is not None and not on_span(x, structure.length)):
+            why = f"is not on the structure, which runs from 0 to {structure.length:g}"
+            raise problem(key, None, f"x = {x:.10g} {why}")
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
         if free_hub and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
@@ -449,14 +413,26 @@ def check_loads(structure: Any, free_hub: bool, loads: Loads) -> None:
     _check_regions(structure, loads.pressure)
 
 
-def _check_moment(key: str, structure: Any, moment: Load) -> None:
+def _check_table(key: str, structure: Any, table: Matrix, timed: bool) -> None:
+    """Refuse a table without a key that may be over the span; in a history it is over time unless it fits the span."""
+    why = None
+    if not timed:
+        why = "is a table [[t, …], …] over time, which a scene without [time] does not have"
+    elif table[0][0] == 0.0 and table[-1][0] == structure.length:
+        why = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
+    if why is not None:
+        how = "over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
+        raise problem(key, None, f"{why}; write {how}")
+
+
+def _check_moment(key: str, structure: Any, moment: LoadTable) -> None:
     if structure.type == "plate" and key != "loads.tip_moment":
         why = "is not available on a plate; give loads.tip_moment, which is spread over the edge"
         if not isinstance(moment, SpanMoment):
             why = "is not available on a plate: at a point it turns the director without limit as the mesh is refined"
         raise problem(key, None, why)
     # A function is checked where it is called; its moment of a planar beam may have one component or three.
-    sizes = {len(vector) for vector in moment.vectors}
+    sizes = {len(vector) for _, vector in moment.vectors}
     if structure.is_planar and sizes - {1}:
         raise problem(key, None, "must have one component, about axis 3, for a planar_beam")
     if not structure.is_planar and sizes - {3}:
@@ -480,21 +456,3 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
         raise problem(key, list(x), f"must be {allowed}")
     if not on_span(x[0], structure.length):
         raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
-
-
-def check_tables(file: str, structure: Any, loads: Loads, when: str) -> None:
-    """Refuse, with a SceneError of the file, tables without a key that may be over the span (see `Scene.check_tables`).
-
-    In a history such a table is over time unless it runs from 0 to the length.
-    """
-    for name, load, _ in loads.named():
-        if not isinstance(load, SpanLoad) or load.table is None:
-            continue
-        why = None
-        if when:
-            why = f"is a table [[t, …], …] over time, which {when} does not have"
-        elif load.table[0][0] == 0.0 and load.table[-1][0] == structure.length:
-            why = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
-        if why is not None:
-            how = "over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
-            raise SceneError(file, f"loads.{name}", None, f"{why}; write {how}")

@@ -38,7 +38,7 @@ Speed = Annotated[Number, unit("rad/s")]
 Pulses = Annotated[tuple[Vector, ...], AfterValidator(_check_pulses), unit("s", "s", "N*m")]
 
 
-class Motion(SceneModel):
+class MotionTable(SceneModel):
     """What all motions share.
 
     Attributes:
@@ -56,7 +56,7 @@ class Motion(SceneModel):
     base_acceleration: Signal | None = None
 
 
-class ConstantMotion(Motion):
+class ConstantMotion(MotionTable):
     """Steady rotation.
 
     Attributes:
@@ -69,7 +69,7 @@ class ConstantMotion(Motion):
     speed: Speed
 
 
-class SpinUpMotion(Motion):
+class SpinUpMotion(MotionTable):
     """Smooth spin-up from rest, Ω(t) = speed (t/T − sin(2πt/T)/2π), then constant.
 
     Attributes:
@@ -83,7 +83,7 @@ class SpinUpMotion(Motion):
     duration: Annotated[Positive, unit("s")]
 
 
-class TableMotion(Motion):
+class TableMotion(MotionTable):
     """Speed interpolated in a table.
 
     Attributes:
@@ -97,7 +97,7 @@ class TableMotion(Motion):
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
 
 
-class TorqueMotion(Motion):
+class TorqueMotion(MotionTable):
     """Free hub under a torque; the hub angle is an unknown.
 
     Attributes:
@@ -129,7 +129,7 @@ class TorqueMotion(Motion):
             raise problem("function", None, "give either a function, which may have pulses in it, or pulses or table")
 
 
-class CallableMotion(Motion):
+class CallableMotion(MotionTable):
     """Speed given by a Python function; not available in a file.
 
     Attributes:
@@ -145,7 +145,7 @@ class CallableMotion(Motion):
     angle: TimeFunction | None = None
 
 
-class LawMotion(WithParameters, Motion):
+class LawMotion(WithParameters, MotionTable):
     """Rotation by a registered `MotionLaw`, whose parameters are keys of the table.
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import existing_file
-from rotfem.scene.structure import Damping, StructureTable, check_one_hub
+from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
 from rotfem.scene.table import Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
     Array,
@@ -85,7 +85,7 @@ class PlateStructure(StructureTable):
     hub_offset: Annotated[Vector, unit("m")] | None = None
     point_masses: Annotated[tuple[tuple[Number, Number, Positive], ...], unit("m", "m", "kg")] = ()
     line_masses: dict[str, Annotated[Positive, unit("kg/m")]] = Field(default_factory=dict)
-    damping: Damping = empty()
+    damping: DampingTable = empty()
 
     @property
     def mesh_file(self) -> str | None:

@@ -18,10 +18,20 @@ from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, noted_files, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import Loads, check_loads, check_tables
-from rotfem.scene.motion import AnyMotion, Motion
-from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
+from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
+from rotfem.scene.loads import LoadsTable, check_loads
+from rotfem.scene.motion import AnyMotion, MotionTable
+from rotfem.scene.settings import (
+    AngularUnit,
+    BeamMesh,
+    Initial,
+    ModelTable,
+    ModesTable,
+    OutputTable,
+    PlateMesh,
+    Solver,
+    Time,
+)
 from rotfem.scene.structure import designed
 from rotfem.scene.table import SceneModel, empty, problem, scene_error, unit
 from rotfem.scene.values import ROUND_OFF, Matrix
@@ -93,12 +103,12 @@ class Scene(SceneModel):
 
     structure: Structure
     motion: AnyMotion
-    model: Model = empty()
+    model: ModelTable = empty()
     initial: Initial = empty()
-    loads: Loads = empty()
+    loads: LoadsTable = empty()
     mesh: Mesh = empty()
     time: Time | None = None
-    modes: Modes = empty()
+    modes: ModesTable = empty()
     solver: Solver = empty()
     output: OutputTable = empty()
     extensions: Extensions = empty()
@@ -120,12 +130,8 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
-        try:
-            tables = to_builtin(data)
-        except RecursionError:
-            raise SceneError(file, allowed="tables or lists are nested too deep") from None
-        with noted_files() as extensions:
-            load_wanted(tables, file, directory)
+        tables, before = to_builtin(data), len(READ)
+        load_wanted(tables, file, directory)
         given = tables.get("motion")
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
@@ -133,12 +139,11 @@ class Scene(SceneModel):
         kind = structure.get("type") if isinstance(structure, Mapping) else None
         context = {"directory": directory, "accuracy": whole.get("accuracy"), "type": kind}
         try:
-            with noted_files() as files:
-                scene = cls.model_validate(whole, context={**context, "hints": hints})
+            scene = cls.model_validate(whole, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
-        scene._inputs = (*extensions, *files)
+        scene._inputs = tuple(dict.fromkeys(READ[before:]))
         return scene
 
     def __repr__(self) -> str:
@@ -213,23 +218,33 @@ class Scene(SceneModel):
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
-        self.check_tables("a steady state" if self.time is None else "")
-
-    def check_tables(self, when: str) -> None:
-        """Check that no table of a load along the structure may be of two kinds."""
-        check_tables(self._file, self.structure, self.loads, when)
 
     def _check(self) -> None:
-        check_together(self)
+        """Refuse tables that cannot be combined, the most basic of them first."""
+        structure, motion, model = self.structure, self.motion, self.model
+        if structure.is_planar:
+            check_planar(motion, self.loads)
+        if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
+            raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
+        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_mesh(structure, self.mesh)
+        check_theory(structure, model)
+        check_frame(structure, motion, model)
+        check_initial(structure, motion, model, self.initial)
+        if self.accuracy is None and self.accuracy_budget is not None:
+            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
+        if self.accuracy is not None and not self.output.error:
+            why = "cannot be combined with accuracy, which is met by what is estimated"
+            raise problem("output.error", False, why)
+        self.output.check(structure.type, structure.length)
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     """Return the validated scene of a TOML file."""
     path = Path(path)
-    with noted_files() as files:
-        tables = apply_overrides(path.name, read_toml(path), overrides)
-        scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
-    scene._inputs = tuple(files)
+    tables = apply_overrides(path.name, read_toml(path), overrides)
+    scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene._inputs = (path.absolute(), *scene._inputs)
     return scene
 
 
@@ -270,30 +285,14 @@ def plain(value: Any) -> Any:
 # --- what tables say together: each check raises a problem that names the key to change ------------------------------
 
 
-def check_together(scene: Scene) -> None:
-    """Refuse tables of a scene that cannot be combined, the most basic of them first."""
-    structure, motion, model = scene.structure, scene.motion, scene.model
-    if structure.is_planar:
-        check_planar(motion, scene.loads)
-    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
-        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
-    check_loads(structure, motion.is_free, scene.loads)
-    check_mesh(structure, scene.mesh)
-    check_theory(structure, model)
-    check_frame(structure, motion, model)
-    check_initial(structure, motion, model, scene.initial)
-    check_accuracy(scene)
-    scene.output.check(structure.type, structure.length)
-
-
-def check_planar(motion: Motion, loads: Loads) -> None:
+def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    vectors |= {f"loads.{name}": load for name, load, _ in loads.named() if load.VECTORS.padded}
-    for key, signal in vectors.items():
-        if signal is not None and not signal.is_planar:
+    forces: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
+    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not name.endswith("moment")}
+    for key, signal in forces.items():
+        if signal is not None and any(len(vector) > 2 and vector[2] != 0.0 for _, vector in signal.vectors):
             value = list(signal.value) if signal.value is not None else None
             raise problem(key, value, "the third component must be 0 for a planar_beam")
     if loads.gravity[2] != 0.0:
@@ -311,7 +310,7 @@ def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
             raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
-def check_theory(structure: Any, model: Model) -> None:
+def check_theory(structure: Any, model: ModelTable) -> None:
     """Refuse a theory that has no strains for the structure."""
     kind, theory = structure.type, registry.theories[model.theory]
     if not theory.holds_for(kind):
@@ -321,7 +320,7 @@ def check_theory(structure: Any, model: Model) -> None:
     check_prestress(structure, model)
 
 
-def check_prestress(structure: Any, model: Model) -> None:
+def check_prestress(structure: Any, model: ModelTable) -> None:
     """Refuse to say what the prestress is of where there is none, or one kind of it only."""
     kind = structure.type
     if model.prestress is None:
@@ -338,7 +337,7 @@ def check_prestress(structure: Any, model: Model) -> None:
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
-def check_frame(structure: Any, motion: Motion, model: Model) -> None:
+def check_frame(structure: Any, motion: MotionTable, model: ModelTable) -> None:
     """Refuse the inertial-frame form where there is none."""
     if structure.pitches and motion.is_free:
         raise problem("structure.root.pitch", None, 'over time needs a speed that is prescribed, not type = "torque"')
@@ -360,7 +359,7 @@ def check_frame(structure: Any, motion: Motion, model: Model) -> None:
             raise problem("model.effects", list(model.effects), f'"{effect.name}" {why}')
 
 
-def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial) -> None:
+def check_initial(structure: Any, motion: MotionTable, model: ModelTable, initial: Initial) -> None:
     """Refuse an initial state that the scene cannot have."""
     displacement = initial.tip_displacement
     if displacement is not None:
@@ -393,14 +392,3 @@ def _check_velocity(structure: Any, rows: Matrix) -> None:
         why = "the third component must be 0 for a planar_beam"
     if why is not None:
         raise problem("initial.velocity", None, why)
-
-
-def check_accuracy(scene: Scene) -> None:
-    """Refuse what an accuracy excludes, and a budget without one."""
-    if scene.accuracy is None:
-        if scene.accuracy_budget is not None:
-            reason = "is what an accuracy may take, and needs accuracy"
-            raise problem("accuracy_budget", scene.accuracy_budget, reason)
-        return
-    if not scene.output.error:
-        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")

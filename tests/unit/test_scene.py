@@ -16,9 +16,8 @@ from pydantic import ValidationError
 
 import rotfem
 from rotfem.commands.problem import motion_of
-from rotfem.errors import Problem, SceneError
+from rotfem.errors import Fault, SceneError
 from rotfem.scene import (
-    BeamMesh,
     PlanarBeamStructure,
     PlateMesh,
     PlateStructure,
@@ -93,25 +92,6 @@ def test_example_scenes_are_valid_and_survive_a_round_trip(name: str) -> None:
 # --- defaults and normal forms --------------------------------------------------------------------------------------
 
 
-def test_defaults_of_a_beam() -> None:
-    s = scene()
-    assert (s.name, s.model.theory, s.model.effects, s.model.frame) == ("test.toml", "reissner", "auto", "rotating")
-    assert s.mesh == BeamMesh(elements=16, degree=3, integration="reduced")
-    assert s.time is None
-    assert (s.modes.count, s.modes.about) == (6, "steady")
-    assert (s.solver.increment_tolerance, s.solver.max_iterations) == (1e-9, 25)
-    assert s.motion.axis == (0.0, 0.0, 1.0)
-    assert s.structure.damping.is_zero
-
-
-def test_defaults_of_a_plate() -> None:
-    s = scene("plate")
-    assert s.mesh == PlateMesh(elements=(8, 8), degree=2, cell="quadrilateral", integration="reduced")
-    assert isinstance(s.structure, PlateStructure)
-    assert s.structure.shear_correction == pytest.approx(5 / 6)
-    assert s.structure.root_position == (0.0, 0.0, 0.0)
-
-
 def test_time_parameters_belong_to_the_scheme() -> None:
     alpha = scene(time={"end": 1, "step": 0.1}).time
     assert alpha is not None
@@ -152,7 +132,7 @@ def test_loads_in_all_their_forms() -> None:
     bare = made(tip_force=[1, 2])["tip_force"]
     np.testing.assert_array_equal(bare.at(7.0), [1, 2, 0])
     assert (bare.kind, bare.constant, bare.is_zero) == ("dead", True, False)
-    table = made(distributed={"table": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})["distributed"]
+    table = made(distributed={"over_time": [[0, 0, 0], [2, 4, 8]], "kind": "follower"})["distributed"]
     np.testing.assert_allclose([table.at(t) for t in (-1, 0.5, 9)], [[0, 0, 0], [1, 2, 0], [4, 8, 0]])
     assert (table.kind, table.constant) == ("follower", False)
     np.testing.assert_array_equal(made(tip_moment=5)["tip_moment"].at(0.0), [5.0])
@@ -335,7 +315,6 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         (b"[structure]\nlength = = 3\n", r"not valid TOML: .*line 2, column 10"),
         (b"[structure\n", r"not valid TOML: .*line 1"),
         (b"a = '\xff'\n", "byte 5 is not UTF-8"),
-        (b"a = " + b"[" * 100_000, "bad.toml: "),
         (b"", "structure: required key is missing"),
     ],
 )
@@ -400,7 +379,7 @@ def test_relative_paths_start_at_the_scene(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_scene_error_survives_pickling() -> None:
-    error = SceneError("a.toml", "mesh.degree", 9, "must be at most 6", [Problem("time", None, "missing")])
+    error = SceneError("a.toml", "mesh.degree", 9, "must be at most 6", [Fault("time", None, "missing")])
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "a.toml: mesh.degree = 9: must be at most 6 (and 1 more)\n  time: missing"
     assert again.problems == error.problems

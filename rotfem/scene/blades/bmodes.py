@@ -14,20 +14,26 @@ import numpy as np
 
 from rotfem.registry import register
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, coned_root, scaled_rows
-from rotfem.scene.values import Array
 
-COLUMNS = [
+COLUMNS = (
     *("str_tw", "tw_iner", "mass_den", "flp_iner", "edge_iner", "flp_stff", "edge_stff", "tor_stff", "axial_stff"),
     *("cg_offst", "sc_offst", "tc_offst"),
-]
+)
+POSITIVE = COLUMNS[2:9]
+
+#: Keys of the section ↦ columns.
+SECTION = {
+    "EA": "axial_stff",
+    "GJ": "tor_stff",
+    "EI2": "flp_stff",
+    "EI3": "edge_stff",
+    "mass_per_length": "mass_den",
+    "rotary_inertia2": "flp_iner",
+    "rotary_inertia3": "edge_iner",
+}
 
 #: Versions in the first line of a main file that are known.
 VERSIONS = ("1.03", "3.00")
-
-#: Names of the first column: of BModes and of what writes its files.
-FIRST = ("sec_loc", "span_loc")
-
-POSITIVE = ("mass_den", "flp_iner", "edge_iner", "flp_stff", "edge_stff", "tor_stff", "axial_stff")
 
 #: Factor of the main file ↦ column.
 FACTORS = {
@@ -46,8 +52,6 @@ FACTORS = {
 #: Values of the main file that are known, and no others: what else there is would be left out unsaid.
 ONLY = {"beam_type": 1.0, "hub_conn": 1.0, "bl_thp": 0.0, "id_mat": 1.0}
 NO_TIP = ("cm_loc", "ixx_tip", "iyy_tip", "izz_tip", "ixy_tip", "izx_tip", "iyz_tip")
-
-SHEAR = ("GA2", "GA3")
 
 
 def _is_main(deck: Deck) -> bool:
@@ -85,58 +89,27 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:
     """Return section and pretwist of a file of section properties, whose columns a main file multiplies by factors."""
-    x, table, first = _table(deck)
-    asked.needs(deck, SHEAR, "beams of BModes do not shear")
+    count = deck.count("n_secs", 2)
+    x, table, first = deck.columns("str_tw mass_den", count, "sec_loc span_loc", COLUMNS, COLUMNS, POSITIVE)
+    for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
+        why = "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read"
+        deck.fail(why, first + int(i))
+    asked.needs(deck, ("GA2", "GA3"), "beams of BModes do not shear")
     table |= {column: factor * table[column] for column, factor in factors.items()}
     tension = table["tc_offst"] - table["sc_offst"]
-    central = {
-        "EI3": table["edge_stff"] - table["axial_stff"] * tension**2,
-        "rotary_inertia3": table["edge_iner"] - table["mass_den"] * table["cg_offst"] ** 2,
-    }
-    for key, about in central.items():
-        for i in np.flatnonzero(about <= 0.0):
-            deck.fail(
-                f"its offset leaves {key} = {about[i]:g} about the centre; must be greater than 0", first + int(i)
-            )
-
-    def rows(found: Array) -> Any:
-        return scaled_rows(x, length, found)
-
-    def points(y: Array) -> Any:
-        return rows(np.stack([y, np.zeros_like(y)], axis=-1))
-
-    return {
-        "pretwist": rows(-np.radians(table["str_tw"])),
-        "section": {
-            "EA": rows(table["axial_stff"]),
-            "GJ": rows(table["tor_stff"]),
-            "EI2": rows(table["flp_stff"]),
-            "EI3": rows(central["EI3"]),
-            "mass_per_length": rows(table["mass_den"]),
-            "rotary_inertia2": rows(table["flp_iner"]),
-            "rotary_inertia3": rows(central["rotary_inertia3"]),
-            "mass_center": points(table["cg_offst"]),
-            "tension_center": points(tension),
-        },
-    }
-
-
-def _table(deck: Deck) -> tuple[Array, dict[str, Array], int]:
-    """Return the places of the sections, parts of the length, the columns there, and the line that they start at."""
-    count = deck.count("n_secs", 2)
-    head = deck.find("str_tw mass_den")
-    names = deck.lines[head - 1].split()
-    if names[0] not in FIRST or names[1:] != COLUMNS:
-        deck.fail(f"columns must be {FIRST[0]} {' '.join(COLUMNS)}", head)
-    first = head + 2  # below the units
-    table = deck.table(first, count, names, POSITIVE)
-    x = table.pop(names[0])
-    deck.increasing(x, first, 1.0, names[0])
-    for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
-        deck.fail(
-            "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read", first + int(i), 3
-        )
-    return x, table, first
+    twist = -np.radians(table["str_tw"])
+    # About the centres, not about the line.
+    table["edge_stff"] = table["edge_stff"] - table["axial_stff"] * tension**2
+    table["edge_iner"] = table["edge_iner"] - table["mass_den"] * table["cg_offst"] ** 2
+    for column in ("edge_stff", "edge_iner"):
+        for i in np.flatnonzero(table[column] <= 0.0):
+            why = f"its offset leaves {column} = {table[column][i]:g} about the centre; must be greater than 0"
+            deck.fail(why, first + int(i))
+    section = {key: table[column] for key, column in SECTION.items()}
+    for key, y in (("mass_center", table["cg_offst"]), ("tension_center", tension)):
+        section[key] = np.stack([y, np.zeros_like(y)], axis=-1)
+    rows = {key: scaled_rows(x, length, values) for key, values in section.items()}
+    return {"pretwist": scaled_rows(x, length, twist), "section": rows}
 
 
 register(BladeFormat("bmodes", "BModes' section properties, or its main file (.bmi)", recognises, read))

@@ -56,8 +56,6 @@ class Deck:
             content = read_bytes(path)
         except Unreadable as error:
             raise problem("section.from", shown(path), f"cannot be read: {error}") from None
-        if b"\0" in content:
-            raise problem("section.from", shown(path), "cannot be read: it is no text")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
@@ -136,17 +134,41 @@ class Deck:
             self.fail(f"has {len(words)} columns; must be {columns}", line)
         return [self.value(word, line, column) for column, word in enumerate(words, start=1)]
 
-    def rows(self, first: int, count: int, columns: int) -> list[list[float]]:
-        """Return the numbers of successive lines."""
-        return [self.row(first + i, columns) for i in range(count)]
-
-    def table(self, first: int, count: int, names: Sequence[str], positive: Collection[str]) -> dict[str, Array]:
+    def table(self, first: int, count: int, names: Sequence[str], positive: Collection[str] = ()) -> dict[str, Array]:
         """Return the columns (count,) of successive lines by name; refuse values that must be positive and are not."""
-        table = dict(zip(names, np.array(self.rows(first, count, len(names))).T, strict=True))
+        rows = [self.row(first + i, len(names)) for i in range(count)]
+        table = dict(zip(names, np.array(rows).T, strict=True))
         for column, name in enumerate(names, start=1):
             for i in np.flatnonzero(table[name] <= 0.0) if name in positive else ():
                 self.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
         return table
+
+    def columns(
+        self,
+        words: str,
+        count: int,
+        places: str,
+        known: Collection[str],
+        needed: Sequence[str],
+        positive: Sequence[str],
+    ) -> tuple[Array, dict[str, Array], int]:
+        """Return the places of stations, parts of the length, the columns there by name, and their first line.
+
+        They stand below the line of their names, in which `words` are, and the line of units; the places come first.
+        """
+        head = self.find(words)
+        right = {name.lower(): name for name in known}
+        first, *names = [right.get(word.lower(), word) for word in self.lines[head - 1].split()]
+        for column, name in enumerate(names, start=2):
+            if name not in known or name in names[: column - 2]:
+                why = f'the column "{name}" is not known, or stands twice; known: {", ".join(known)}'
+                self.fail(why, head, column)
+        if first not in places.split() or not set(needed) <= set(names):
+            self.fail(f"the columns must be {places.replace(' ', ' or ')}, {', '.join(needed)}", head)
+        table = self.table(head + 2, count, [first, *names], positive)
+        x = table.pop(first)
+        self.increasing(x, range(head + 2, head + 2 + count), 1.0, first)
+        return x, table, head + 2
 
     def hub_and_length(self, hub: str, tip: str) -> tuple[float, float]:
         """Return the radius of the hub and the length beyond it (m) of lines `value  name …`."""
@@ -156,16 +178,16 @@ class Deck:
         return inner, outer - inner
 
     def increasing(
-        self, values: Sequence[float] | Array, first: int, last: float | None = None, what: str = "x"
+        self, values: Sequence[float] | Array, lines: Sequence[int], last: float = 0.0, what: str = ""
     ) -> None:
-        """Refuse a first column, on lines from `first` on, that does not rise from 0 strictly (up to `last`)."""
+        """Refuse a first column, on these lines, that does not rise from 0 strictly, to `last` if that is given."""
         if values[0] != 0.0:
-            self.fail(f"{what} must start at 0, not at {values[0]:g}", first, 1)
-        for i in range(1, len(values)):
-            if values[i] <= values[i - 1]:
-                self.fail(f"{what} must increase: {values[i]:g} ≤ {values[i - 1]:g}", first + i, 1)
-        if last is not None and not math.isclose(values[-1], last, rel_tol=DIGITS):
-            self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", first + len(values) - 1, 1)
+            self.fail(f"{what} must start at 0, not at {values[0]:g}", lines[0], 1)
+        for line, before, after in zip(lines[1:], values, values[1:], strict=False):
+            if after <= before:
+                self.fail(f"{what} must increase: {after:g} ≤ {before:g}", line, 1)
+        if last and not math.isclose(values[-1], last, rel_tol=DIGITS):
+            self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", lines[-1], 1)
 
 
 # --- formats ---------------------------------------------------------------------------------------------------------
@@ -245,11 +267,8 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     """
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
-    with (
-        problems_at("section.from", shown(path)),
-        np.errstate(all="ignore"),
-    ):  # what overflows is refused by the section, with its key
-        read = kind.read(deck, asked)
+    with problems_at("section.from", shown(path)), np.errstate(all="ignore"):
+        read = kind.read(deck, asked)  # what overflows is refused by the section, with its key
     own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
         for key in there:

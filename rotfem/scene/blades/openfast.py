@@ -34,8 +34,8 @@ from rotfem.scene.blades.deck import (
 )
 from rotfem.scene.values import DIGITS, ROUND_OFF, Array, is_positive
 
-#: Columns of ElastoDyn's blade file that must be there.
-NEEDED = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff")
+#: Columns of ElastoDyn's blade file that must be there, after BlFract.
+NEEDED = ("StrcTwst", "BMassDen", "FlpStff", "EdgStff")
 
 #: Those that may be there ↦ the property of a section; they are taken where all their values are greater than 0.
 TAKEN = {"GJStff": "GJ", "EAStff": "EA", "FlpIner": "rotary_inertia2", "EdgIner": "rotary_inertia3"}
@@ -43,8 +43,8 @@ TAKEN = {"GJStff": "GJ", "EAStff": "EA", "FlpIner": "rotary_inertia2", "EdgIner"
 #: Those that are left out. Of offsets the signs are not documented, and ElastoDyn computes without them.
 LEFT_OUT = ("Alpha", "PrecrvRef", "PreswpRef", "FlpcgOf", "EdgcgOf", "FlpEAOf", "EdgEAOf")
 
-#: Those that the motion does not depend on.
-PASSED_OVER = ("PitchAxis", "AeroCent")
+#: All that are known, with those that the motion does not depend on.
+KNOWN = (*NEEDED, *TAKEN, *LEFT_OUT, "PitchAxis", "AeroCent")
 
 
 # --- OpenFAST's main file -----------------------------------------------------------------------------------------
@@ -111,9 +111,7 @@ def _blade(deck: Deck, asked: Asked, length: float | None = None) -> dict[str, A
     """Return section, pretwist and damping of a blade file; the scene has other stiffness, and a length (m) of None."""
     count = deck.count("NBlInpSt", 2)
     factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
-    head = deck.find("BlFract BMassDen")
-    table = _columns(deck, head, count)
-    x = table["BlFract"]
+    x, table, _ = deck.columns("BlFract BMassDen", count, "BlFract", KNOWN, NEEDED, NEEDED[1:])
     taken = {key: table[name] for name, key in TAKEN.items() if name in table and np.all(table[name] > 0.0)}
     without = [key for key in ("EA", "GA2", "GA3", "GJ") if key not in taken]
     asked.needs(deck, tuple(without), "blades of ElastoDyn do not stretch, shear or twist")
@@ -137,22 +135,6 @@ def _blade(deck: Deck, asked: Asked, length: float | None = None) -> dict[str, A
     if given := {family: found for family, found in ratios.items() if any(found)}:
         keys["damping"] = {"modal": given}
     return keys
-
-
-def _columns(deck: Deck, head: int, count: int) -> dict[str, Array]:
-    """Return the columns (count,) of a blade file below the line of their names, and of the units."""
-    known = {name.lower(): name for name in (*NEEDED, *TAKEN, *LEFT_OUT, *PASSED_OVER)}
-    names = [known.get(word.lower(), word) for word in deck.lines[head - 1].split()]
-    for column, name in enumerate(names, start=1):
-        if name not in known.values() or name in names[: column - 1]:
-            allowed = ", ".join(known.values())
-            deck.fail(f'the column "{name}" is not known, or stands twice; known: {allowed}', head, column)
-    if missing := [name for name in NEEDED if name not in names]:
-        deck.fail(f"the columns {', '.join(missing)} are missing", head)
-    first = head + 2
-    table = deck.table(first, count, names, NEEDED[2:])
-    deck.increasing(table["BlFract"], first, 1.0, "BlFract")
-    return table
 
 
 # --- BeamDyn ------------------------------------------------------------------------------------------------------
@@ -184,42 +166,36 @@ def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
         why = f"has {members} members; only blades of one member are known, as a line of splines"
         deck.refuse("member_total", why)
     first = deck.find("kp_xr kp_yr kp_zr initial_twist") + 2
-    points = np.array(deck.rows(first, count, 4))
-    line = points[:, :3] @ FROM_IEC.T
+    table = deck.table(first, count, ("x", "y", "z", "twist"))
+    line = np.stack([table[name] for name in "xyz"], axis=-1) @ FROM_IEC.T
     if np.linalg.norm(line[0]) > ROUND_OFF * np.linalg.norm(line[-1]):
         deck.fail("the first key point must be (0, 0, 0)", first)
     rows, through, at = line_of(line)
     if len(at) != count:
         deck.fail("two key points are the same", first)
-    pretwist = iec_pretwist(through.at(at)[1], np.radians(points[:, 3]))
+    pretwist = iec_pretwist(through.at(at)[1], np.radians(table["twist"]))
     return {"line": rows, "pretwist": rows_over(at, pretwist), **_matrices(deck.file("BldFile"), asked, through.length)}
 
 
 def _matrices(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
     """Return the tables of matrices of a blade file, and its damping."""
-    count = deck.count("station_total", 2)
-    line = deck.find("DISTRIBUTED PROPERTIES") + 1
-    stations: list[float] = []
+    count, head = deck.count("station_total", 2), deck.find("DISTRIBUTED PROPERTIES")
+    lines = [number for number, line in enumerate(deck.lines, start=1) if number > head and line.strip()]
+    if len(lines) < 13 * count:
+        deck.fail(f"ends before station {len(lines) // 13 + 1} is complete; station_total says that there are {count}")
     matrices: dict[str, list[Array]] = {"stiffness": [], "mass": []}
-    for _ in range(count):
-        line = _next(deck, line, "the station")
-        eta = deck.row(line, 1)[0]
-        if eta <= stations[-1] if stations else eta != 0.0:
-            deck.fail(f"stations must increase from 0 to 1; this one is {eta:g}", line, 1)
-        stations.append(eta)
-        line += 1
-        for name, found in matrices.items():
-            line = _next(deck, line, f"the matrix of {name}")
-            matrix = np.array(deck.rows(line, 6, 6))
+    stations = list[float]()
+    for i in range(0, 13 * count, 13):
+        stations += deck.row(lines[i], 1)
+        for (name, found), first in zip(matrices.items(), (i + 1, i + 7), strict=True):
+            matrix = np.array([deck.row(line, 6) for line in lines[first : first + 6]])
             if not np.max(np.abs(matrix - matrix.T)) <= DIGITS * np.max(np.abs(matrix)):
-                deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", line)
+                deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", lines[first])
             matrix = (matrix + matrix.T) / 2
             if not is_positive(matrix, name == "stiffness", DIGITS):
-                deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", line)
+                deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", lines[first])
             found.append(turned_matrix(matrix, FROM_IEC))
-            line += 6
-    if not np.isclose(stations[-1], 1.0, rtol=1e-6):
-        deck.fail(f"stations must end at 1; the last of {count} is {stations[-1]:g}", line - 14, 1)
+    deck.increasing(stations, lines[: 13 * count : 13], 1.0, "the stations")
     section = {name: scaled_rows(stations, length, np.array(found)) for name, found in matrices.items()}
     return {"section": section, **_damping(deck, asked)}
 
@@ -233,15 +209,6 @@ def _damping(deck: Deck, asked: Asked) -> dict[str, Any]:
         return {"damping": {"kelvin_voigt": mu[0]}} if mu[0] > 0.0 else {}
     asked.leaves_out(deck, f"mu1 … mu6 = {', '.join(f'{each:g}' for each in mu)} s, which differ", "structure.damping")
     return {}
-
-
-def _next(deck: Deck, line: int, what: str) -> int:
-    """Return the next line that is not empty."""
-    while line <= len(deck.lines) and not deck.lines[line - 1].strip():
-        line += 1
-    if line > len(deck.lines):
-        deck.fail(f"the file ends before {what}; station_total says that there is another")
-    return line
 
 
 register(BladeFormat("openfast", "OpenFAST's main file (.fst)", _is_openfast, _openfast))
