@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.equations.clamp import along_axis
 from rotfem.equations.stations import StationChanges
 from rotfem.numerics.linear import ComplexSolver
 from rotfem.numerics.projection import summed
-from rotfem.structures.root_reaction import along_axis
 
 Array = npt.NDArray[Any]
 

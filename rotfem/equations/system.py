@@ -20,7 +20,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rotfem.equations.clamp import TurningClamp
+from rotfem.equations.clamp import RootReaction, TurningClamp
 from rotfem.equations.hub import HubRow
 from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
@@ -33,7 +33,6 @@ from rotfem.numerics.forms import Assembler, Functionals, added
 from rotfem.numerics.linear import DirectSolver, SingularSolver, is_regular
 from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
 from rotfem.structures.reference_rotation import ReferenceRotation
-from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
 

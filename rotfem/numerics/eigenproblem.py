@@ -28,8 +28,17 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
-from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
+from rotfem.numerics.linear import (
+    ROUNDED,
+    SMALL,
+    DirectSolver,
+    balanced,
+    least_frequency,
+    power_of_two,
+    transposed,
+    unknown_scale,
+    use_direct_solver,
+)
 from rotfem.numerics.projection import Sendable, sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 

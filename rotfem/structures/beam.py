@@ -16,11 +16,12 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, RootSpring, Strain
+from rotfem.mechanics.bodies import Body, RootSpring, Strain
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
-from rotfem.structures.meshes.plate_mesh import beam_nodes, boundary_tags
+from rotfem.structures.mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative
