@@ -18,7 +18,7 @@ from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.errors import SceneError
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.problem import Output
-from rotfem.mechanics.theories import Theory, ladder
+from rotfem.mechanics.theories import Theory
 from rotfem.registry import Registry, register
 from rotfem.scene import Scene
 from rotfem.scene.section_shapes import Geometry, Shape
@@ -128,8 +128,6 @@ def strains(q: Any) -> tuple[Any, ...]:
 def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert (Theory.registry, Effect.registry) == (registry.theories, registry.effects)
     assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
-    assert ladder()[0] == "linear"
-    assert set(ladder()) == set(registry.theories.names)
     assert registry.schemes.names == ("generalised_alpha", "newmark", "energy_conserving", "esdirk4")
 
 
