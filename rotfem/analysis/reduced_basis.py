@@ -30,9 +30,8 @@ from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, product
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
-from rotfem.numerics.linear import ROUNDED
+from rotfem.numerics.linear import ROUNDED, unknown_scale
 from rotfem.numerics.projection import dense, orthonormal, spanned, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 

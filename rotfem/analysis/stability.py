@@ -28,9 +28,15 @@ from rotfem.analysis.modal import GROWTH
 from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
-from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
+from rotfem.numerics.linear import (
+    negative_count,
+    negative_eigenvalues,
+    righted,
+    symmetric,
+    unknown_scale,
+    use_direct_solver,
+)
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.units import speed_text

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.equations.affine import AffineSystem
+from rotfem.equations.clamp import along_axis
 from rotfem.equations.hub import HubRow
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
@@ -23,7 +24,6 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.time_signals import View, viewed
 from rotfem.numerics.projection import bordered
-from rotfem.structures.root_reaction import along_axis
 from rotfem.structures.structure import check_memory
 
 Array = npt.NDArray[np.float64]

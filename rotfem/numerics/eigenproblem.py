@@ -28,8 +28,17 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
-from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
+from rotfem.numerics.linear import (
+    ROUNDED,
+    SMALL,
+    DirectSolver,
+    balanced,
+    least_frequency,
+    power_of_two,
+    transposed,
+    unknown_scale,
+    use_direct_solver,
+)
 from rotfem.numerics.projection import Sendable, sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
@@ -199,11 +208,6 @@ class Eigenpairs:
         """Return the pairs of an index array, in its order."""
         vectors = self.right[:, index], self.left[:, index]
         return Eigenpairs(self.values[index], *vectors, self.errors[index], self.bounds[index])
-
-    def joined(self, others: Eigenpairs) -> Eigenpairs:
-        """Return these pairs and others behind them."""
-        names = ("values", "right", "left", "errors", "bounds")
-        return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
 
 
 def repeated(values: Array, bounds: Array) -> list[list[int]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
@@ -68,18 +69,27 @@ def check_increasing(rows: Any) -> Any:
     return rows
 
 
-def check_steps(rows: Any) -> Any:
-    """Return rows of a section over the span, x not decreasing; two rows of one x between the ends are a step."""
+def check_span(rows: Any) -> Any:
+    """Return rows (x, …); refuse x (m) that decreases, or does not change; one x may stand in two of them: a jump."""
     if isinstance(rows, float):
         return rows
     x = [row[0] for row in rows]
-    if len(x) < 2 or x[0] == x[1] or x[-2] == x[-1]:
-        raise problem("", None, "must have at least two rows, the first two and the last two of different x")
+    if len(rows) < 2 or x[0] == x[-1]:
+        raise problem("", None, "must have at least two rows at different x")
     for i, (before, after) in enumerate(pairwise(x), start=2):
-        if after < before or x.count(after) > 2:
-            why = "x must not decrease; two rows of one x are a step, and no more than two"
-            raise problem("", None, f"{why}; row {i}: {after:g} after {before:g}")
+        if after < before:
+            raise problem("", None, f"the first column must not decrease; row {i}: {after:g} < {before:g}")
+    place, times = Counter(x).most_common(1)[0]
+    if times > 2:
+        raise problem("", None, f"x = {place:g} stands in {times} rows; must be in one, or in two, where it jumps")
     return rows
+
+
+def increasing(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return numbers that increase strictly; refuse others, and none."""
+    if not values or any(b <= a for a, b in pairwise(values)):
+        raise problem("", None, "must be numbers that increase")
+    return values
 
 
 def check_start(rows: Any) -> Any:
@@ -96,7 +106,7 @@ Span = Annotated[
 #: A number, or a taper ((x, value), …), x (m) strictly increasing.
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
 #: A number, or a taper from x = 0, in which two rows of one x are a step.
-Profile = Annotated[Span[T], AfterValidator(check_steps), AfterValidator(check_start)]
+Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start)]
 #: Rows (t, value), t (s) strictly increasing.
 TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_increasing)]
 

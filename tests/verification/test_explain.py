@@ -23,6 +23,8 @@ from rotfem.registry import register
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.estimated
+
 #: Part of the spin-up, with steps that are seen.
 COARSE_STEPS = {"motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0}, "time": {"end": 6.0, "step": 0.04}}
 

@@ -9,8 +9,6 @@ import pytest
 from rotfem import Problem, RunResult, run
 from rotfem.analysis.equilibrium import conditioning
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 #: Tip deflection that is asked for, over the length.
 SMALL = 1e-3
 

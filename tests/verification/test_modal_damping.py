@@ -24,8 +24,6 @@ from rotfem.results import ModesResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 SECTION = {"EA": 2.8e7, "GA2": 1e7, "GA3": 1e7, "GJ": 1e4, "EI2": 1.4e4, "EI3": 2.8e4, "mass_per_length": 1.2}
