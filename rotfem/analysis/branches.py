@@ -305,6 +305,11 @@ class Sweep:
         """Append a point, and one before it where the model between cannot tell the branches."""
         last = self.points[-1]
         path = BranchPath(last, target, lambda: self._model(last.spinning, target.spinning), self.count)
+        wave = self.wave(target, 0)
+        if path.hidden is None and wave is not None and wave.shaft and not wave.fixed:
+            # A shaft that differs by direction is unstable between two speeds at which K is singular.
+            ends = path.model.singular(last.speed, target.speed)
+            path.hidden = float(np.mean(ends[:2])) if len(ends) == 2 else None
         if self._room and (path.hidden is not None or path.weak):
             self._insert(path.hidden or 0.5 * (last.speed + target.speed))
             self._advance(target)
@@ -335,17 +340,22 @@ class Sweep:
         wave = self.wave(point, branch)
         return "" if wave is None else wave.direction(point.value(branch).imag, abs(point.speed))
 
-    def critical_speeds(self, orders: Collection[int]) -> list[dict[str, Any]]:
+    def critical_speeds(self, orders: Collection[int], ranges: Sequence[dict[str, Any]] = ()) -> list[dict[str, Any]]:
         """Return the critical speeds of the branches: the synchronous ones of a rotor first, each kind by speed.
 
         - "forward": the frequency in the rotor is zero, so that an unbalance, which rests in it, has no stiffness
-          against it. Order 1.
+          against it. Order 1. Of a shaft that differs by direction both ends of a range of static instability.
         - "backward", order 1: a shaft whirls against the spin at the frequency Ω in the fixed frame, 2Ω in the rotor.
           Order m: a disk's wave of m diameters against the spin stands still in the fixed frame, mΩ in the disk.
         - "per_rev": the frequency in the rotor is kΩ, order k of those given.
 
         Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
+
+        Args:
+            orders: k.
+            ranges: of instability (see `onsets`).
         """
+        static = [(r["speed"], r["until"] or np.inf) for r in ranges if r["kind"] == "static instability"]
         wanted, out = list[tuple[int, int, int | None]](), []
         for i, right in enumerate(self.points[1:]):
             for b in range(self.count):
@@ -362,7 +372,9 @@ class Sweep:
             for speed in speeds:
                 if k is None:
                     if wave is not None and not wave.fixed:
-                        out.append(self._critical(b, "forward", 1, 0, speed))
+                        within = [ends for ends in static if ends[0] <= speed <= ends[1]]
+                        found = [end for end in (within[0] if within else [speed]) if np.isfinite(end)]
+                        out += [self._critical(b, "forward", 1, 0, end) for end in found]
                 elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and way)):
                     out.append(self._critical(b, way, wave.number, k, speed))
                 elif k in orders:

@@ -177,6 +177,13 @@ class SpeedModel:
             pairs = pencil.solve(count, 0.1 * float(np.sqrt(least)))
         return Spinning(speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
 
+    def singular(self, low: float, high: float) -> Array:
+        """Return the speeds between two at which K is singular, increasing; K is taken to be linear in Ω² there."""
+        left, right = (self._at(speed)[2] for speed in (low, high))
+        shares = np.linalg.eigvals(np.linalg.solve(left, left - right))  # 1/share: det(left + share (right − left)) = 0
+        shares = np.array([1.0 / x.real for x in shares if abs(x.imag) < 1e-9 * abs(x) and x.real > 1.0])
+        return np.sort(np.sqrt(low**2 + shares * (high**2 - low**2)))
+
     def inside(self, s: Spinning) -> Spinning:
         """Return modes with their vectors in the basis."""
         if s.lift is self.lift or self._dual is None:

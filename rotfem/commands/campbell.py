@@ -229,7 +229,8 @@ def meetings(
         fastest = max(abs(point.speed) for point in sweep.points)
         highest = np.nanmax([point.value(b).imag for point in sweep.points for b in range(sweep.count)])
         orders = range(1, 1 + int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4)))
-    return orders, sweep.critical_speeds(orders), sweep.onsets()
+    ranges = sweep.onsets()
+    return orders, sweep.critical_speeds(orders, ranges), ranges
 
 
 class FinishedSpeeds:
