@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
 
 import numpy as np
-from pydantic import AfterValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
 
 from rotfem.places import apart
 from rotfem.scene.blades.deck import Asked, keys_of
@@ -17,7 +17,18 @@ from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.structure import DampingTable, Hinge, Root, SpatialRoot, StructureTable, check_one_hub
 from rotfem.scene.supports import SupportTable
-from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
+from rotfem.scene.table import (
+    BY_SHAPE,
+    SceneModel,
+    along,
+    empty,
+    in_units,
+    one_of,
+    problem,
+    problems_at,
+    scene_error,
+    unit,
+)
 from rotfem.scene.values import (
     DIGITS,
     ROUND_OFF,
@@ -53,30 +64,104 @@ def _as_matrix(inertia: float | Matrix) -> Array:
     return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
 
 
+class DiskTable(SceneModel):
+    """A disk on a shaft.
+
+    Attributes:
+        outer_diameter: of the disk (m).
+        inner_diameter: of its bore (m).
+        width: along the shaft (m).
+        rho: density (kg/m³).
+    """
+
+    outer_diameter: Annotated[Positive, unit("m")]
+    inner_diameter: Annotated[NonNegative, unit("m")] = 0.0
+    width: Annotated[Positive, unit("m")]
+    rho: Annotated[Positive, unit("kg/m**3")]
+
+    def _check(self) -> None:
+        if self.inner_diameter >= self.outer_diameter:
+            raise problem("inner_diameter", self.inner_diameter, "must be less than outer_diameter")
+
+    @property
+    def mass(self) -> float:
+        """Mass, kg."""
+        return float(self.rho * np.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2) * self.width)
+
+    @property
+    def inertias(self) -> tuple[float, float]:
+        """Moments of inertia about its axis, and about a diameter through its centre (kg·m²)."""
+        polar = self.mass / 8 * (self.outer_diameter**2 + self.inner_diameter**2)
+        return polar, polar / 2 + self.mass * self.width**2 / 12
+
+
 class PointMass(SceneModel):
-    """A rigid body fixed to a section.
+    """A rigid body fixed to a section: by mass and inertia, by polar and transverse inertia, or as a disk.
 
     Attributes:
         x: place along the beam (m).
         mass: of the body (kg).
-        offset: position of its center relative to the axis, section axes (m).
+        offset: position of its center relative to the axis, section axes (m): three numbers for a spatial beam.
         inertia: about its center (kg·m²): of a planar beam about axis 3; of a spatial one a tensor in section axes, or
             a number, isotropic.
+        polar_inertia: of a body that is round about the axis (kg·m²), instead of inertia.
+        transverse_inertia: of the same about a diameter (kg·m²).
+        disk: a disk that has mass and inertia, instead of these.
     """
 
     x: Annotated[Number, unit("m")]
     mass: Mass = 0.0
     offset: Annotated[PaddedVector, unit("m")] = (0.0, 0.0, 0.0)
     inertia: Inertia = 0.0
+    polar_inertia: Annotated[NonNegative, unit("kg*m**2")] | None = None
+    transverse_inertia: Annotated[NonNegative, unit("kg*m**2")] | None = None
+    disk: DiskTable | None = None
 
     @property
     def inertia_matrix(self) -> Array:
         """Inertia tensor (kg·m²), shape (3, 3)."""
         return _as_matrix(self.inertia)
 
+    @classmethod
+    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
+        """Write mass and inertia of a disk, and the inertia of a round body."""
+        data = dict(data)
+        if data.get("disk") is not None:
+            if given := {"mass", "inertia", "polar_inertia", "transverse_inertia"} & data.keys():
+                raise problem(sorted(given)[0], None, "cannot be combined with disk, which has it")
+            try:
+                disk = DiskTable.model_validate(data.pop("disk"), context=info.context)
+            except ValidationError as error:
+                found = scene_error("", error)
+                raise problem(f"disk.{found.key}", found.value, found.allowed) from None
+            data |= {
+                "mass": disk.mass,
+                **dict(zip(("polar_inertia", "transverse_inertia"), disk.inertias, strict=True)),
+            }
+        round_body = [data.pop(name, None) for name in ("polar_inertia", "transverse_inertia")]
+        if round_body != [None, None]:
+            if None in round_body or "inertia" in data:
+                raise problem("polar_inertia", None, "needs transverse_inertia, and no inertia beside them")
+            polar, across = round_body
+            data["inertia"] = [[polar, 0, 0], [0, across, 0], [0, 0, across]]
+        return data
+
     def _check(self) -> None:
         if self.mass == 0.0 and not np.any(self.inertia_matrix):
             raise problem("mass", self.mass, "give mass, inertia, or both")
+
+
+def _three(value: Any) -> Any:
+    """Return a vector; refuse one of two numbers, which may be meant along the axis or across it."""
+    if isinstance(value, list | tuple) and len(value) == 2:
+        raise problem("", list(value), "must be [x, y, z]: along the beam, and both directions across it")
+    return value
+
+
+class SpatialPointMass(PointMass):
+    """A rigid body fixed to a section of a spatial beam."""
+
+    offset: Annotated[Vector, BeforeValidator(_three), unit("m")] = (0.0, 0.0, 0.0)
 
 
 class BeamStructure(StructureTable):
@@ -197,6 +282,7 @@ class SpatialBeamStructure(BeamStructure):
 
     type: Literal["spatial_beam"] = "spatial_beam"
     hub_offset: Annotated[Vector, unit("m")] | None = None
+    masses: tuple[SpatialPointMass, ...] = ()
     tip_inertia: Inertia = 0.0
     tip_offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
     section: SpatialSection

@@ -190,6 +190,12 @@ class SupportTable(SceneModel):
         return bool(np.all(np.abs(matrices(self.stiffness)[:, (0, 1), (0, 1)]).max(axis=0) > 0.0))
 
     @property
+    def of_frequency(self) -> bool:
+        """Whether it depends on the frequency of whirl."""
+        tables = (self.stiffness, self.damping, self.tilt_stiffness, self.tilt_damping)
+        return any(isinstance(c, OverSpeed) and c.of_frequency for c in tables)
+
+    @property
     def coefficients(self) -> list[Array]:
         """All matrices, (n, 2, 2), of stiffness and damping of displacements and turns."""
         return [matrices(c) for c in (self.stiffness, self.damping, self.tilt_stiffness, self.tilt_damping)]

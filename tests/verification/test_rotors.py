@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig
+from scipy.optimize import brentq
 
 import rotfem
 from rotfem.commands.modes import analysis_of
@@ -469,3 +470,59 @@ def test_bearings_over_speed_have_the_modes_of_their_values() -> None:
         motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
         one, other = (rotfem.modes(shaft_on_bearings(k, motion=motion)).frequencies for k in (table, value))
         np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_bearings_over_frequency_are_those_of_each_whirl() -> None:
+    """A stiffness k + a ω²: half the disk on it is heavier, k̂(ω) = k_s (k + aω²)/(k_s + k + aω²) = m/2 ω²; 1e-4."""
+    k, a, k_s, half = 2e4, 3.0, 24.0 * EI, 5.0
+    rows = [[w, k + a * w**2] for w in np.linspace(0.0, 200.0, 201)]
+    found = rotfem.modes(shaft_on_bearings({"over_frequency": rows})).frequencies[0]
+    omega = brentq(lambda w: k_s * (k + a * w**2) / (k_s + k + a * w**2) - half * w**2, 10.0, 200.0)
+    np.testing.assert_allclose(found, omega, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("support", "key"),
+    [
+        ({"stiffness": [[100, 1e7], [200, 2e7]]}, "stiffness.*over_speed"),
+        ({"stiffness": {"over_speed": [[10, 1.0], [5, 2.0]]}}, "over_speed.*increase"),
+        ({"stiffness": {"over_speed": [[10, 1.0, 2.0, 3.0], [15, 2.0, 1.0, 1.0]]}}, "over_speed"),
+        ({"stiffness": {}}, "exactly one"),
+        ({"stiffness": 1.0, "housing": [{"mass": -1.0, "stiffness": 1.0}]}, "housing.0.mass"),
+        ({"stiffness": 1.0, "housing": [{"mass": 1.0}]}, "housing.0.stiffness"),
+    ],
+)
+def test_tables_of_supports_that_cannot_be(support: dict[str, Any], key: str) -> None:
+    tables = shaft_on_bearings(1.0)
+    tables["structure"]["supports"] += [{"x": 0.5} | support]
+    with pytest.raises(rotfem.SceneError, match=rf"structure\.supports\.2\..*{key}"):
+        rotfem.Scene.from_dict(tables)
+
+
+def test_disk_is_its_mass_and_inertias() -> None:
+    """A disk of 280/50 mm, 70 mm wide, of steel, and the same by its numbers."""
+    by_size = {"disk": {"outer_diameter": 0.28, "inner_diameter": 0.05, "width": "70 mm", "rho": 7810}}
+    mass = 7810 * np.pi / 4 * (0.28**2 - 0.05**2) * 0.07
+    polar = mass / 8 * (0.28**2 + 0.05**2)
+    by_number = {"mass": mass, "polar_inertia": polar, "transverse_inertia": polar / 2 + mass * 0.07**2 / 12}
+    scene = shaft_on_bearings(2e4)
+    one, other = (
+        rotfem.modes(scene | {"structure": scene["structure"] | {"masses": [{"x": 0.5} | body]}}).frequencies
+        for body in (by_size, by_number)
+    )
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+    scene["structure"]["masses"] = [{"x": 0.5, "mass": 1.0, "offset": [0.0, 1e-4]}]
+    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset.*\[x, y, z\]"):
+        rotfem.Scene.from_dict(scene)
+
+
+@pytest.mark.parametrize("speeds", ["0:150:2", "0:150:7"])
+def test_range_of_an_unequal_shaft_does_not_depend_on_the_grid(speeds: str) -> None:
+    """Both ends of the range are forward critical speeds, however far apart the speeds are: 1e-4, as above."""
+    scene = shaft_on_bearings(1e9)
+    scene["structure"]["section"] |= {"EI3": 1.3 * EI}
+    ends = np.sqrt(np.array([1.0, 1.3]) * 48.0 * EI / 10.0)
+    diagram = rotfem.campbell(scene, speeds, orders=0)
+    (found,) = diagram.instabilities
+    np.testing.assert_allclose([found.speed, found.until], ends, rtol=1e-4)
+    np.testing.assert_allclose([c.speed for c in diagram.critical_speeds if c.kind == "forward"], ends, rtol=1e-4)
