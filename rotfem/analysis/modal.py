@@ -325,7 +325,7 @@ class ModalAnalysis:
         if self.system.linear:
             return None
         sizes = np.sqrt(np.abs(K.getDiagonal().array))
-        moves = self.structure.moves
+        moves = np.array([name.startswith("u") for name in self.structure.unknowns])
         owned = self.system.V.dofmap.index_map.size_local * len(moves)
         nodes = sizes[:owned].reshape(-1, len(moves))
         nodes[:, moves] = nodes[:, moves].max(axis=1, keepdims=True)

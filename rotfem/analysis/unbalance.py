@@ -107,7 +107,11 @@ class UnbalanceResponse:
         u = solver.solve(np.asarray(self._force * speed**2, dtype=np.complex128))
         nodes = analysis.structure.nodes(u)[1][:, self._across[:2]].T
         forces = []
+        names = list(analysis.structure.unknowns)
         for support, point in zip(analysis.structure.data.supports, self._at, strict=True):
             K_b, C_b = (frame.coefficient(c, speed) for c in (support.stiffness, support.damping))
-            forces.append((K_b + 1j * speed * C_b) @ point(u)[self._across[:2]])
+            here, x = point(u), point(u)[self._across[:2]]
+            if support.housing:  # which the support stands on
+                x = x - here[[names.index(f"u{d}_housing_0") for d in (2, 3)]]
+            forces.append((K_b + 1j * speed * C_b) @ x)
         return nodes, np.array(forces, dtype=np.complex128).reshape(-1, 2).T

@@ -28,6 +28,10 @@ from rotfem.numerics import compat, form_cache
 SAME_PATTERN = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
+#: Size of blocks up to which dolfinx assembles its own matrices from Python.
+LARGEST_BLOCK = 9
+
+
 class Assembler:
     """Makes PETSc matrices of forms whose entries are all in one pattern.
 
@@ -44,7 +48,7 @@ class Assembler:
 
     def __init__(self, form: Any, bcs: list[Any]):
         own = self._own = fem.create_matrix(form, la.BlockMode.expanded)
-        self._constraints, dofmap = [bc._cpp_object for bc in bcs], form.function_spaces[0].dofmap
+        self._bcs, self._constraints, dofmap = bcs, [bc._cpp_object for bc in bcs], form.function_spaces[0].dofmap
         owned, nodes, self._block = own.index_map(0).size_local, dofmap.index_map, dofmap.index_map_bs
         self._comm, self._sizes = form.mesh.comm, ((owned, own.index_map(0).size_global),) * 2
         numbers = nodes.local_to_global(np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32))
@@ -107,11 +111,24 @@ class Assembler:
         """Return the owned entries of a sum of compiled forms in the whole pattern; the next ones overwrite them."""
         A, constrained = self._own._cpp_object, [] if diagonal is None else self._constraints
         self._all.fill(0.0)
+        if self._block > LARGEST_BLOCK:
+            return self._by_petsc(several, diagonal)
         for form in several:
             code = form._cpp_object
             cpp.fem.assemble_matrix(A, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code), constrained)
         if self._comm.size > 1:
             self._own.scatter_reverse()
+        if diagonal is not None:
+            self._entries[self._diagonal] = diagonal
+        return self._entries
+
+    def _by_petsc(self, several: Sequence[Any], diagonal: float | None) -> Any:
+        """Return the same, assembled by PETSc, which knows blocks of any size."""
+        A = self.zero()
+        for form in several:
+            fem_petsc.assemble_matrix(A, form, self._bcs if diagonal is not None else [])
+        A.assemble()
+        self._entries[:] = A.getValuesCSR()[2]
         if diagonal is not None:
             self._entries[self._diagonal] = diagonal
         return self._entries

@@ -20,9 +20,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from basix.ufl import element
 from dolfinx import fem
@@ -34,6 +36,7 @@ from rotfem.mechanics.bodies import Body, Kinematics, Strain, Support
 from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
+from rotfem.places import ONE
 from rotfem.structures.beam import Beam
 from rotfem.structures.mode_names import Wave, shaft_wave
 from rotfem.structures.reference_rotation import SectionTurns, check_sections
@@ -183,6 +186,10 @@ class SpatialBeam(Beam):
             raise InputError("structure.root.pitch", None, "changes with time: the motion of the problem must have it")
         #: Pitch at t = 0; that of later times is in the motion of the frame.
         self._first_pitch = s.root.pitch.constant if pitch is None else pitch.start
+        #: Displacements of housings across the beam, unknowns of the nodes of their supports.
+        self.extra = tuple(
+            f"u{d}_housing_{j}" for j in range(max((len(b.housing) for b in s.supports), default=0)) for d in (2, 3)
+        )
         super().__init__(problem, comm, s.knots, s.nodes)
         self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
@@ -194,7 +201,7 @@ class SpatialBeam(Beam):
         self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
         # behind one hinge turns add up; behind two or three the clamp is one of turns from the hub
-        counted = self.size == len(self.components) and len(self.released) <= 1
+        counted = len(self.active) == len(self.components) and len(self.released) <= 1
         self.turns = SectionTurns.of(self) if counted else None
 
     @classmethod
@@ -207,7 +214,7 @@ class SpatialBeam(Beam):
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
             return False
-        if any(support.couples for support in data.supports):
+        if any(support.couples or support.housing for support in data.supports):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
@@ -291,7 +298,7 @@ class SpatialBeam(Beam):
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
         c, s = np.cos(self.data.precone), np.sin(self.data.precone)
         R = np.kron(np.eye(2), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
-        return np.asarray(np.einsum("ij,nj...->ni...", R, values))
+        return np.concatenate([np.einsum("ij,nj...->ni...", R, values[:, :6]), values[:, 6:]], axis=1)
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return the whirl of a mode where the beam is a shaft: its undeformed axis is that of the spin."""
@@ -316,14 +323,35 @@ class SpatialBeam(Beam):
         return self.data.root.released or super().released
 
     def supports(self, frame: Any) -> list[Support]:
-        """Return the supports, across direction 1: of displacements, and of turns."""
+        """Return the supports, across direction 1: of displacements and of turns, and what is under their housings."""
         out, q = [], self.k.q
         for i, support in enumerate(self.data.supports):
-            at, rotating = self.points.measure((support.x,)), support.frame == "rotating"
-            for kind, x in (("", (q[1], q[2])), ("tilt_", (q[4], q[5]))):
-                names = [f"{kind}stiffness", f"{kind}damping"]
-                K, D = (frame.coefficients(f"supports_{i}_{name}", getattr(support, name)) for name in names)
-                out.append(Support(ufl.as_vector(x), K, D, at, not rotating))
+            at, at_rest = self.points.measure((support.x,)), support.frame != "rotating"
+            places = [(q[1], q[2]), *(self._housing(j) for j in range(len(support.housing))), (0, 0)]
+            springs = [(f"supports_{i}_", support, "")]
+            springs += [(f"supports_{i}_housing_{j}_", under, "") for j, under in enumerate(support.housing)]
+            moves = [tuple(x - y for x, y in zip(*pair, strict=True)) for pair in pairwise(places)]
+            for (name, of, kind), x in [
+                *zip(springs, moves, strict=True),
+                ((f"supports_{i}_", support, "tilt_"), (q[4], q[5])),
+            ]:
+                keys = [f"{kind}stiffness", f"{kind}damping"]
+                K, D = (frame.coefficients(f"{name}{key}", getattr(of, key)) for key in keys)
+                out.append(Support(ufl.as_vector(x), K, D, at, at_rest))
+        return out
+
+    def _housing(self, j: int) -> tuple[Any, Any]:
+        """Return the displacements across the beam of the j-th housing under a support."""
+        first = len(self.components) + 2 * j
+        return self.k.q[first], self.k.q[first + 1]
+
+    def without_extra(self) -> list[npt.NDArray[np.int32]]:
+        """Return of each displacement of a housing the local nodes without such a one."""
+        x, out = self.V.tabulate_dof_coordinates()[:, 0], []
+        for j in range(len(self.extra) // 2):
+            places = [support.x for support in self.data.supports if len(support.housing) > j]
+            away = np.all(np.abs(x[:, None] - places) > ONE * self.length, axis=1)
+            out += 2 * [np.flatnonzero(away).astype(np.int32)]
         return out
 
     def root_turn(self, axis: int) -> Any:
@@ -366,7 +394,13 @@ class SpatialBeam(Beam):
         bodies = [self._mass(forms.mass, forms.mass_center, self.dx)]
         if "rotary_inertia" in effects:
             bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
-        return bodies + self._tip_bodies() if "tip_mass" in effects else bodies
+        bodies += self._tip_bodies() if "tip_mass" in effects else []
+        for i, support in enumerate(self.data.supports if "supports" in effects else ()):
+            for j, under in enumerate(support.housing):
+                mass = self.scalar(f"supports_{i}_housing_{j}_mass", under.mass)
+                x, at = ufl.as_vector((0, *self._housing(j))), self.points.measure((support.x,))
+                bodies.append(Body(x, mass, at, effect="supports"))
+        return bodies
 
     def _mass(self, density: Any, center: tuple[Any, ...], measure: Any, effect: str = "") -> Body:
         """Return mass at r + Λ c; c has these components along t_i⁰."""
@@ -426,6 +460,6 @@ class SpatialBeam(Beam):
 
         In a plane a rotation vector has one component, and no limit.
         """
-        in_plane = self.size < len(self.components) and self.problem.theory.exact
+        in_plane = len(self.active) < len(self.components) and self.problem.theory.exact
         if self.turns is None and not in_plane:
             check_sections(self, q, time)

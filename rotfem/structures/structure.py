@@ -122,6 +122,8 @@ class Structure(Loaded):
     inner_rows: Array = np.empty(0)
     #: Names of the unknowns.
     components: ClassVar[tuple[str, ...]]
+    #: Further unknowns of nodes, which are no components of the structure and exist at one node each: see `held`.
+    extra: tuple[str, ...] = ()
     #: Normal of a plane that it may be symmetric about, 0 to 2 ↦ the components of motions in that plane.
     planes: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Whether such a plane is its middle surface, so that to first order its bending is apart from its stretching.
@@ -152,7 +154,7 @@ class Structure(Loaded):
         self.comm, self.data = comm, problem.structure
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
-        self.size = len(self.active)
+        self.size = len(self.active) + len(self.extra)
         #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
@@ -169,7 +171,7 @@ class Structure(Loaded):
 
     def _kinematics(self, functions: tuple[Any, Any, Any, Any]) -> Kinematics:
         """Return q, v, a and δq with all components, made of functions of the active ones and zeros."""
-        if self.size == len(self.components):
+        if len(self.active) == len(self.components):
             return Kinematics(*functions)
         places = {component: i for i, component in enumerate(self.active)}
         numbers = range(len(self.components))
@@ -193,13 +195,13 @@ class Structure(Loaded):
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns of a node: of the active components."""
-        return tuple(self.components[i] for i in self.active)
+        """Names of the unknowns of a node: of the active components, and further ones."""
+        return (*(self.components[i] for i in self.active), *self.extra)
 
     def whole_values(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return all components of values (…, unknowns of a node), zeros for inactive ones."""
-        if self.size == len(self.components):
-            return values
+        if len(self.active) == len(self.components):
+            return values[..., : len(self.components)]
         out = np.zeros((*values.shape[:-1], len(self.components)), dtype=values.dtype)
         out[..., self.active] = values
         return out
@@ -248,8 +250,20 @@ class Structure(Loaded):
         return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.intp]:
-        """Return the local numbers of the unknowns that the clamp holds at nodes, the owned clamped ones if None."""
-        return self._numbers(nodes, self._clamped_components())
+        """Return the local numbers of the unknowns that the clamp holds at nodes; those of all owned nodes if None.
+
+        Among the latter are further unknowns where there are none.
+        """
+        held = self._numbers(nodes, self._clamped_components())
+        if nodes is not None or not self.extra:
+            return held
+        owned = self.V.dofmap.index_map.size_local
+        elsewhere = [n[n < owned] * self.size + len(self.active) + i for i, n in enumerate(self.without_extra())]
+        return np.concatenate([held, *elsewhere])
+
+    def without_extra(self) -> list[npt.NDArray[np.int32]]:
+        """Return of each further unknown the local nodes that do not have it; of none here."""
+        return []
 
     def hinged_unknowns(self) -> npt.NDArray[np.intp]:
         """Return the local numbers of those of owned nodes that the clamp leaves free, in order."""
@@ -266,8 +280,10 @@ class Structure(Loaded):
         constrained = self._clamped_components()
         if len(constrained) == self.size:
             return [fem.dirichletbc(fem.Function(self.V), self.clamped)]
+        held = [(i, self.clamped) for i in constrained]
+        held += [(len(self.active) + i, nodes) for i, nodes in enumerate(self.without_extra())]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, self.clamped * self.size + i, self.V.sub(i)) for i in constrained]
+        return [fem.dirichletbc(zero, nodes * self.size + i, self.V.sub(i)) for i, nodes in held]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
