@@ -353,6 +353,11 @@ class SpatialBeamStructure(BeamStructure):
         return all(map(same_about_axis, (*self.section.at(places).values(), *bodies)))
 
     @property
+    def has_tip_mass(self) -> bool:
+        """Whether there is anything at the tip, at another point, or under a support, that has inertia."""
+        return super().has_tip_mass or any(support.housing for support in self.supports)
+
+    @property
     def has_fibers(self) -> bool:
         """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0

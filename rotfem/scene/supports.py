@@ -178,7 +178,7 @@ class SupportTable(SceneModel):
     frame: Literal["fixed", "rotating"] | None = None
 
     def _check(self) -> None:
-        if not any(map(np.any, self.coefficients)):
+        if not any(np.any(matrices(c)) for c in (*self.springs, *self.dampers)):
             raise problem("stiffness", None, "give stiffness, damping, or both; tilt_stiffness of turns")
         for i, under in enumerate(self.housing):
             if not np.any(matrices(under.stiffness)):
@@ -190,31 +190,36 @@ class SupportTable(SceneModel):
         return bool(np.all(np.abs(matrices(self.stiffness)[:, (0, 1), (0, 1)]).max(axis=0) > 0.0))
 
     @property
-    def of_frequency(self) -> bool:
-        """Whether it depends on the frequency of whirl."""
-        tables = (self.stiffness, self.damping, self.tilt_stiffness, self.tilt_damping)
-        return any(isinstance(c, OverSpeed) and c.of_frequency for c in tables)
+    def springs(self) -> list[Any]:
+        """Stiffnesses, of displacements and turns, and those under its housings."""
+        return [self.stiffness, self.tilt_stiffness, *(under.stiffness for under in self.housing)]
 
     @property
-    def coefficients(self) -> list[Array]:
-        """All matrices, (n, 2, 2), of stiffness and damping of displacements and turns."""
-        return [matrices(c) for c in (self.stiffness, self.damping, self.tilt_stiffness, self.tilt_damping)]
+    def dampers(self) -> list[Any]:
+        """Dampings likewise."""
+        return [self.damping, self.tilt_damping, *(under.damping for under in self.housing)]
+
+    @property
+    def of_frequency(self) -> bool:
+        """Whether it depends on the frequency of whirl."""
+        return any(isinstance(c, OverSpeed) and c.of_frequency for c in (*self.springs, *self.dampers))
 
     @property
     def couples(self) -> bool:
         """Whether it couples both directions."""
-        return any(bool(np.any(A[:, (0, 1), (1, 0)])) for A in self.coefficients)
+        return any(bool(np.any(matrices(c)[:, (0, 1), (1, 0)])) for c in (*self.springs, *self.dampers))
 
     @property
     def feeds(self) -> bool:
         """Whether it dissipates or feeds energy: by dampers, or a stiffness that is not symmetric."""
-        (K, C, tilting, damping) = self.coefficients
-        return any(map(np.any, (C, damping))) or any(np.any(A[:, 0, 1] != A[:, 1, 0]) for A in (K, tilting))
+        unequal = (np.any(A[:, 0, 1] != A[:, 1, 0]) for A in map(matrices, self.springs))
+        return any(np.any(matrices(c)) for c in self.dampers) or any(unequal)
 
     @property
     def isotropic(self) -> bool:
         """Whether every rotating frame sees it alike: all matrices are [[a, b], [−b, a]]."""
-        return all(np.all(A[:, 0, 0] == A[:, 1, 1]) and np.all(A[:, 0, 1] == -A[:, 1, 0]) for A in self.coefficients)
+        found = map(matrices, (*self.springs, *self.dampers))
+        return all(np.all(A[:, 0, 0] == A[:, 1, 1]) and np.all(A[:, 0, 1] == -A[:, 1, 0]) for A in found)
 
 
 def matrices(coefficient: Any) -> Array:

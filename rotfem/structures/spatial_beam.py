@@ -395,11 +395,11 @@ class SpatialBeam(Beam):
         if "rotary_inertia" in effects:
             bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
         bodies += self._tip_bodies() if "tip_mass" in effects else []
-        for i, support in enumerate(self.data.supports if "supports" in effects else ()):
+        for i, support in enumerate(self.data.supports if "tip_mass" in effects else ()):
             for j, under in enumerate(support.housing):
                 mass = self.scalar(f"supports_{i}_housing_{j}_mass", under.mass)
                 x, at = ufl.as_vector((0, *self._housing(j))), self.points.measure((support.x,))
-                bodies.append(Body(x, mass, at, effect="supports"))
+                bodies.append(Body(x, mass, at, effect="tip_mass"))
         return bodies
 
     def _mass(self, density: Any, center: tuple[Any, ...], measure: Any, effect: str = "") -> Body:
