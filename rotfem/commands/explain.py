@@ -38,6 +38,7 @@ from rotfem.commands.first_state import first_state
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
@@ -311,7 +312,7 @@ class Explanation:
         return out
 
 
-def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
     """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
     if system.linear:
         return compute()
@@ -325,7 +326,7 @@ def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
         system.plain = True
 
 
-def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
+def marched(scene: Scene, problem: Any, system: System) -> Outcome:
     """Return the tip over time of a system, at all steps."""
     time = scene.time
     assert time is not None
@@ -424,7 +425,7 @@ def _turning(of: Explanation) -> tuple[Array, Array]:
     return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
 
 
-def _added_mass(system: Any, effect: str) -> float:
+def _added_mass(system: System, effect: str) -> float:
     """Return the masses that an effect brings, as a share of the mass of the structure without them."""
     switch = system.structure.constant(1.0)
     bodies = [b for b in system.structure.bodies((effect,)) if b.is_position]

@@ -33,6 +33,7 @@ from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.commands.run_store import Memory, RunStore, interval
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
@@ -83,7 +84,7 @@ class Simulation:
         if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
-        self.system: Any = compile_system(problem, there, moving=scene.time is not None)
+        self.system = compile_system(problem, there, moving=scene.time is not None)
         if times is None:
             self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
@@ -208,7 +209,7 @@ class Simulation:
             for self.log.steps, state in enumerate(march, first):
                 self._stepped(state, time, progress)
 
-    def _start(self, system: Any) -> Start:
+    def _start(self, system: System) -> Start:
         """Return what the history starts from in a system, which may be of another mesh or theory."""
         there = system.model.problem
         problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
