@@ -9,6 +9,7 @@ which is the balance of angular momentum of hub and structure, exactly and for e
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,28 +34,34 @@ class BySpin:
     The speed along the axis of the motion is varied.
 
     Attributes:
-        ufl: the derivative, a UFL form; None if the speed is not in the form.
+        constants: in it: the factors c_v and c_m, and the variation of the speed, 0.
     """
 
     def __init__(self, model: Model, form: Any):
-        self._factors = [model.structure.constant(0.0) for _ in range(2)]
-        parts, expanded = [], expand_derivatives(form)
-        for name, factor in zip(("w", "dw"), self._factors, strict=True):
+        self.constants = [model.structure.constant(0.0) for _ in range(3)]
+        self._model, self._form = model, form
+
+    @cached_property
+    def ufl(self) -> Any:
+        """The derivative, a UFL form; None if the speed is not in the form."""
+        model, parts, expanded = self._model, [], expand_derivatives(self._form)
+        *factors, zero = self.constants
+        for name, factor in zip(("w", "dw"), factors, strict=True):
             constant = model.frame.constants.get(name)
             if constant is None:
                 continue
             within = [part for part in expanded.integrals() if constant in extract_constants(part.integrand())]
-            s = ufl.variable(model.structure.constant(0.0))
+            s = ufl.variable(zero)
             axis = model.motion.axis[-constant.value.size :]
             shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
             derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
             if not derivative.empty():
                 parts.append(factor * derivative)
-        self.ufl = added(parts) if parts else None
+        return added(parts) if parts else None
 
     def set(self, c_v: float, c_m: float) -> None:
         """Set the factors."""
-        for constant, value in zip(self._factors, (c_v, c_m), strict=True):
+        for constant, value in zip(self.constants, (c_v, c_m), strict=False):
             constant.value = value
 
 
@@ -81,14 +88,19 @@ class HubRow:
         self._by_spin = BySpin(model, moment)
         *state, dq = model.structure.k.functions
         self._state = [x.x.array for x in state]
-        outside = [term for name, term in moments.items() if not model.acting[name].momentum]
-        wanted = {
-            "moment": moment,
-            "spin": self._by_spin.ufl,
-            "row": weighted(self._shifts, (ufl.derivative(moment, x, dq) for x in state)) if self.coupled else None,
-            "outside": added(outside) if outside else None,
-        }
-        self._forms = {name: forms.form(form, once) for name, form in wanted.items() if form is not None}
+
+        def make() -> dict[str, Any]:
+            outside = [term for name, term in moments.items() if not model.acting[name].momentum]
+            wanted = {
+                "moment": moment,
+                "spin": self._by_spin.ufl,
+                "row": weighted(self._shifts, (ufl.derivative(moment, x, dq) for x in state)) if self.coupled else None,
+                "outside": added(outside) if outside else None,
+            }
+            return {name: form for name, form in wanted.items() if form is not None}
+
+        purpose, more = f"hub {model.motion.axis} {model.effects}", (*self._shifts, *self._by_spin.constants)
+        self._forms = model.derived_forms(purpose, make, more, once)[1]
         self._momentum: Any = None
         self._vector = compat.create_vector(model.structure.V)
 

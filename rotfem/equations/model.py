@@ -185,8 +185,17 @@ class Model:
                 out[name] = self._switched(name, name in self.effects, term)
         return out
 
-    def derived_forms(self, purpose: str, make: Callable[[], dict[str, Any]], more: tuple[Any, ...] = ()) -> Both:
-        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes."""
+    def derived_forms(
+        self, purpose: str, make: Callable[[], dict[str, Any]], more: tuple[Any, ...] = (), once: bool = True
+    ) -> Both:
+        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
+
+        Args:
+            purpose: what beside the residual they depend on.
+            make: name ↦ UFL form.
+            more: constants and functions in them that are not in the residual.
+            once: see `rotfem.numerics.forms.form`.
+        """
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
         functions = [*residual.coefficients(), *(x for x in more if isinstance(x, ufl.Coefficient))]
@@ -196,7 +205,7 @@ class Model:
             both = {name: known.on(self.structure.V, whole, data) for name, known in _KNOWN[key].items()}
             return {name: parts for name, (parts, _) in both.items()}, {name: form for name, (_, form) in both.items()}
         derived = make()
-        compiled = {name: forms.form(f, once=True) for name, f in derived.items()}
+        compiled = {name: forms.form(f, once) for name, f in derived.items()}
         known = {name: forms.mesh_free(f, compiled[name], whole) for name, f in derived.items()}
         if None not in known.values():
             _KNOWN[key] = known

@@ -58,7 +58,7 @@ class PointStresses:
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
         self.mechanics = mechanics
         self._q, self._v, *_ = mechanics.k.functions
-        self._before, self._step = fem.Function(V), fem.Function(V)
+        self.functions = self._before, self._step = fem.Function(V), fem.Function(V)
         self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
 
     def come_from(self, before: Array) -> None:
@@ -107,23 +107,25 @@ class NonlinearSystem(System):
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._shift_entries = [constant.value for constant in self._shifts]  # where they are
-        self._spin: Any = None
         self.signs = np.full_like(self._b_array, -1.0)
         self.signs[self.clamped] = 0.0
-        if self.moving:
-            residuals = self.model.by_strains() if self.parted else [self.model.residual]
-            libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
-            if self.model.hub is not None and self._by_spin.ufl is not None:
-                libraries[-1].append(self._by_spin.ufl)
-            once = self.parted and self.structure.planar
-            compiled = [[forms.form(f, once) for f in library] for library in libraries]
-            self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
-            self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
+        if self.moving and self.parted:
+            parts, once = self.model.by_strains(), self.structure.planar
+            self._F = [forms.form(F, once) for F in parts]
+            self._J = [forms.form(self._tangent_of(F), once) for F in parts]
+            self._pattern = self._J[0]
+        elif self.moving:
+            made = self.model.derived_forms("moving", self._made_moving, tuple(self._shifts), once=False)[1]
+            self._F, self._J = [made["F"]], [made["J"]]
             self._pattern = self._J[0]
         else:
             self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
         return Assembler(self._pattern, self.bcs)
+
+    def _made_moving(self) -> dict[str, Any]:
+        """Return F and its tangent as UFL forms."""
+        return {"F": self.model.residual, "J": self._tangent_form}
 
     @per_composition
     def _tangent_form(self) -> Any:
@@ -173,12 +175,16 @@ class NonlinearSystem(System):
     @per_composition
     def _on_the_way(self) -> Any:
         """Return the tangent with these stresses, compiled; of a system that is not moving K alone at v = a = 0."""
+        purpose, more = f"on the way {self.model.theory.name}", (*self._stresses.functions, *self._shifts)
+        return self.model.derived_forms(purpose, self._made_on_the_way, more, once=not self.moving)[1]["K"]
+
+    def _made_on_the_way(self) -> dict[str, Any]:
+        """Return this tangent as a UFL form."""
         trial = ufl.TrialFunction(self.V)
         if self.moving:
             change = self._stresses.change(trial, self._shifts[1] / self._shifts[0])
-            return forms.form(self._tangent_form + self._shifts[0] * change)
-        change = self._stresses.change(trial)
-        return forms.form(self._at_rest["K"] + change, once=True)
+            return {"K": self._tangent_form + self._shifts[0] * change}
+        return {"K": self._at_rest["K"] + self._stresses.change(trial)}
 
     @per_composition
     def _at_rest(self) -> dict[str, Any]:
@@ -283,12 +289,21 @@ class NonlinearSystem(System):
     def _by_spin(self) -> BySpin:
         return BySpin(self.model, self.model.residual)
 
+    @per_composition
+    def _spin(self) -> Any:
+        """Return the column of a free hub, compiled; None if the speed is not in F."""
+        by_spin, purpose = self._by_spin, f"spin {self.model.motion.axis}"
+
+        def make() -> dict[str, Any]:
+            return {} if by_spin.ufl is None else {"spin": by_spin.ufl}
+
+        return self.model.derived_forms(purpose, make, tuple(by_spin.constants), once=False)[1].get("spin")
+
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector (reused), zero at clamped unknowns."""
-        if self._by_spin.ufl is None:
+        if self._spin is None:
             self._spun.zeroEntries()
             return self._spun
-        self._spin = forms.form(self._by_spin.ufl) if self._spin is None else self._spin
         self._by_spin.set(c_v, c_m)
         return assembled(self._spin, self.V, self.clamped, self._spun)
 
@@ -309,13 +324,19 @@ class EnergyBalance:
         *self._functions, self._test = self._k.functions
         self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))
         self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
-        self._F, self._J = forms.form(self._residual), forms.form(self._tangent)
+        more = (*self._shifts, self._start, self._end, self._before, self._ahead)
+        purpose = f"energy balance {self.model.theory.name}"
+        made = self.model.derived_forms(purpose, self._made, more, once=False)[1]
+        self._F, self._J = made["F"], made["J"]
         self._inertia = compat.create_vector(system.V)
         self._moved = compat.wrap(self._move.x)
         self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
         self._factor = self._due = 0.0
 
     # --- forms -------------------------------------------------------------------------------------------------------
+
+    def _made(self) -> dict[str, Any]:
+        return {"F": self._residual, "J": self._tangent}
 
     @cached_property
     def _others(self) -> Any:

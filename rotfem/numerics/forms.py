@@ -181,20 +181,18 @@ class MeshFree(NamedTuple):
         code: FFCx's form, and its module.
         coefficients, constants: their places among those of a whole.
         parts: places of the constants of each integral.
-        rank: number of arguments.
     """
 
     code: tuple[Any, Any]
     coefficients: list[int]
     constants: list[int]
     parts: list[list[int]]
-    rank: int
 
     def on(self, V: fem.FunctionSpace, whole: tuple[Sequence[Any], Sequence[Any]], regions: Any) -> tuple[Any, Any]:
         """Return (constants of each integral, compiled form) on the mesh of a space of the arguments."""
         coefficients = [whole[0][i] for i in self.coefficients]
         constants = [whole[1][i] for i in self.constants]
-        made = compat.form_of(*self.code, [V] * self.rank, coefficients, constants, regions)
+        made = compat.form_of(*self.code, V, coefficients, constants, regions)
         return [[whole[1][i] for i in part] for part in self.parts], made
 
 
@@ -206,7 +204,7 @@ def mesh_free(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]])
         return None
     places, parts = {c: i for i, c in enumerate(constants)}, constants_of(f)
     own = [places[c] for c in f.constants()], [[places[c] for c in part] for part in parts]
-    return MeshFree((code, compiled.module), [coefficients.index(x) for x in used], *own, len(f.arguments()))
+    return MeshFree((code, compiled.module), [coefficients.index(x) for x in used], *own)
 
 
 def constants_of(f: Any) -> list[list[Any]]:
