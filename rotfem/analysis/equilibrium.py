@@ -21,7 +21,7 @@ from mpi4py import MPI
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
-from rotfem.mechanics.loads import Load, Loads
+from rotfem.mechanics.loads import Load, Loads, Shapes, Term
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import richest
@@ -148,7 +148,8 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
     Raises:
         ComputationError: no equilibrium with this displacement was found; says how far the tip was led.
     """
-    still, force = Motion.constant_speed(0.0), Loads(named={"tip_force": Load.of_components((0.0, 1.0, 0.0))})
+    unit = Load("dead", (Term(Shapes.uniform([(0.0, 1.0, 0.0)])),))
+    still, force = Motion.constant_speed(0.0), Loads(named={"tip_force": unit})
     resting = problem.replace(frame="rotating", effects=(), motion=still, loads=force, terms={}, outputs={})
     system = compile_system(resting, comm, moving=False)
     q: Array = system.zeros()

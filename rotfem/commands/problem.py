@@ -307,7 +307,7 @@ def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
     given = m.base_acceleration
-    base = None if given is None else load_of("motion.base_acceleration", given, scene.structure)
+    base = None if given is None else load_of("motion.base_acceleration", given, scene.structure, float)
     more = {
         "base_acceleration": no_acceleration if base is None else base.at,
         "is_accelerated": base is not None and not base.is_zero,

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work
-from rotfem.mechanics.loads import AnyLoad, Loads, is_moment
+from rotfem.mechanics.loads import Load, Loads, is_moment
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
 from rotfem.registry import Registry, damping_models, resolved, structures
@@ -192,7 +192,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     return polar, axial
 
 
-def _of_load(load: AnyLoad) -> Array:
+def _of_load(load: Load) -> Array:
     """Return the largest size of each component of a load over all times, shape (3,); infinite where it is unknown."""
     values = np.zeros(3) if load.is_zero else load.sizes()
     if values is None:

@@ -16,7 +16,8 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, RootSpring, Strain
+from rotfem.mechanics.bodies import Body, RootSpring, Strain
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart

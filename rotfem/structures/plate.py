@@ -20,8 +20,8 @@ from mpi4py import MPI
 from scipy.spatial import Delaunay, KDTree
 
 from rotfem.errors import ComputationError, InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
-from rotfem.mechanics.loads import AnyLoad
+from rotfem.mechanics.bodies import Body, Kinematics, Strain
+from rotfem.mechanics.loads import AppliedLoad, Load
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
@@ -302,7 +302,7 @@ class Plate(Structure):
 
     # --- loads ------------------------------------------------------------------------------------------------------
 
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+    def applied(self, name: str, load: Load) -> list[AppliedLoad]:
         """Return the work of one load: tip force and moment are spread over the edge "tip"."""
         if name.startswith("tip") and not self._has_tip:
             why = 'needs a physical curve "tip" in the mesh, which it works on'

@@ -30,7 +30,8 @@ from mpi4py import MPI
 from ufl import cross
 
 from rotfem.errors import InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain, Support
+from rotfem.mechanics.bodies import Body, Kinematics, Strain, Support
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam

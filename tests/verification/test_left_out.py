@@ -15,7 +15,7 @@ from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.root import SpatialRoot, SupportTable
+from rotfem.scene.structure import SpatialRoot, SupportTable
 
 BEAM: dict[str, Any] = {
     "type": "spatial_beam",
