@@ -26,7 +26,7 @@ from rotfem.numerics.eigenproblem import Pencil
 from rotfem.results import ModesResult
 
 SCENE = Path(__file__).with_name("iccia_hub_beam.toml")
-REFERENCE = 100 * (8.079190 / 6.417749 - 1)  # %; Legendre–Ritz, Euler–Bernoulli, in tests/verification/test_errata.py
+REFERENCE = 100 * (8.079190 / 6.417749 - 1)  # %; Legendre–Ritz, Euler–Bernoulli (docs/theory.md, errata)
 
 
 def modes(theory: str, radius: float, speed: float) -> ModesResult:

@@ -19,10 +19,9 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from rotfem import registry
-from rotfem.scene import beams, loads, motion, plates, root, section, settings
+from rotfem.scene import beams, loads, motion, plates, section, settings, structure
 from rotfem.scene.extensions import Extensions
 from rotfem.scene.scene import Scene
-from rotfem.scene.structure import DampingTable
 from rotfem.scene.table import SceneModel
 from rotfem.scene.values import padded, parameters_of
 
@@ -64,24 +63,28 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ("`[structure.section]` of a spatial beam", section.SpatialSection, ""),
     (
         "`[structure.damping]`",
-        DampingTable,
+        structure.DampingTable,
         "toml\n[structure.damping]\nkelvin_voigt = 1e-4\nmodal = [0.0048, 0.0048, 0.006]",
     ),
-    ("`[structure.root]` of a planar beam", root.Root, "toml\n[structure.root]\nlag_stiffness = 5e4\nlag_damping = 20"),
+    (
+        "`[structure.root]` of a planar beam",
+        structure.Root,
+        "toml\n[structure.root]\nlag_stiffness = 5e4\nlag_damping = 20",
+    ),
     (
         "`[structure.root]` of a spatial beam",
-        root.SpatialRoot,
+        structure.SpatialRoot,
         "toml spatial\n[structure.root]\nflap_stiffness = 0\nlag_stiffness = 0\nhinge_offset = 0.3\npitch = '8 deg'",
     ),
     (
         "`structure.root.pitch` as a table",
-        root.PitchAngle,
+        structure.PitchAngle,
         "toml spatial\n[structure.root.pitch]\nvalue = '8 deg'\n"
         "harmonic = [{ amplitude = '3 deg', per_rev = 1, phase = '90 deg' }]",
     ),
     (
         "`[[structure.supports]]`",
-        root.SupportTable,
+        structure.SupportTable,
         "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
         "root = { driven = true }\nsupports = [{ x = 0, stiffness = 1e6, damping = 200 }, { x = 10, stiffness = 1e6 }]",
     ),

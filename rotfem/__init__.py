@@ -19,7 +19,7 @@ from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.accuracy.cost import CostResult as CostResult
-    from rotfem.analysis.runge_kutta import ESDIRK4 as ESDIRK4
+    from rotfem.analysis.schemes import ESDIRK4 as ESDIRK4
     from rotfem.analysis.schemes import GeneralisedAlpha as GeneralisedAlpha
     from rotfem.analysis.schemes import Newmark as Newmark
     from rotfem.analysis.schemes import Scheme as Scheme

@@ -1,25 +1,26 @@
 """`python -m rotfem`, and the command `rotfem`."""
 
+import gc
+import signal
 import sys
-
-from rotfem.commands.interrupts import importing
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C waits until all that it is made of is there.
+    """Run the command line.
 
-    Typer is imported without rich, which takes longer than all the rest and puts backslashes into the helps.
+    Ctrl-C ends the process at once until there is a result folder: in the middle of an import an exception becomes any
+    other. No garbage is collected until then, as what is imported stays. Typer is imported without rich, which takes
+    longer than all the rest and puts backslashes into the helps.
     """
-    try:
-        with importing():
-            sys.modules["rich"] = None  # type: ignore[assignment]
-            import typer  # noqa: F401
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # which a background job has not
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    gc.disable()
+    sys.modules["rich"] = None  # type: ignore[assignment]
+    import typer  # noqa: F401
 
-            del sys.modules["rich"]
-            from rotfem.commands.cli import main as command
-    except KeyboardInterrupt:
-        print("rotfem: interrupted", file=sys.stderr)
-        raise SystemExit(130) from None
+    del sys.modules["rich"]
+    from rotfem.commands.cli import main as command
+
     command()
 
 

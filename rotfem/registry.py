@@ -94,7 +94,7 @@ def _check_class(entry: Any) -> None:
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
 theories: Registry[Any] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Any] = Registry("effect", "rotfem.mechanics.effects")
-schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.schemes", "rotfem.analysis.runge_kutta")
+schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.schemes")
 shapes: Registry[Any] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Any] = Registry("output", "rotfem.mechanics.problem")
 blade_formats: Registry[Any] = Registry(

@@ -48,12 +48,12 @@ class Radau5(Scheme):
         stages = [self.stage(i, state, h, end, ()) for i in range(3)]
         system, newton, previous = equations.system, equations.newton, np.inf
         equations.imbalance(Stage(state.t, state.q.copy(), state.v.copy(), state.a.copy(), 0.0, 0.0))
-        matrices = [csr_array(M.getValuesCSR()[::-1]) for M in system.with_hub(system.held.mass_damping_stiffness())]
+        matrices = [csr_array(M.getValuesCSR()[::-1]) for M in system.with_hub(system.mass_damping_stiffness())]
         solvers = [splu((s * s * matrices[0] + s * matrices[1] + matrices[2]).tocsc()) for s in LAMBDA / h]
         for _ in range(newton.max_iterations):
             residuals = np.array([equations.imbalance(stage) for stage in stages])
             parts = [solver.solve(row) for solver, row in zip(solvers, np.linalg.inv(T) @ residuals, strict=True)]
-            dq = np.array([system.local(x) for x in np.real(T @ np.array(parts))])
+            dq = np.real(T @ np.array(parts))
             for stage, q, v, a in zip(stages, dq, W @ dq / h, W @ W @ dq / h**2, strict=True):
                 stage.q[:], stage.v[:], stage.a[:] = stage.q + q, stage.v + v, stage.a + a
             newton.iterations += 1

@@ -206,7 +206,10 @@ class Answers:
     def variant(self, setting: Setting) -> Scene:
         """Return the scene with a setting, without an accuracy and without errors of its own."""
         changes: dict[str, Any] = dict.fromkeys(("accuracy", "accuracy_budget"))
-        if (time := self.scene.time) is not None and setting.moving:
+        time = self.scene.time
+        if time is not None and not setting.moving:  # its tolerance may be that of the accuracy
+            changes |= {"time.tolerance": time.tolerance}
+        if time is not None and setting.moving:
             if setting.scheme != time.scheme:
                 changes |= {f"time.{name}": None for name in time.parameters}
             if setting.step != time.step:  # numbers of steps are those of others

@@ -51,9 +51,7 @@ class Modes:
     @property
     def output(self) -> Spectrum:
         """Eigenvalues and shapes."""
-        return Spectrum(
-            self.spinning.pairs.resolved, sampled(self.analysis, self.analysis.right(self.spinning)), self.count
-        )
+        return Spectrum(self.spinning.pairs.resolved, sampled(self.analysis, self.spinning.right), self.count)
 
     @property
     def round_off(self) -> float:
@@ -101,7 +99,11 @@ def round_off(values: Array, bounds: Array) -> float:
 
 
 def modal_answers(
-    scene: Scene, analysis: ModalAnalysis, speed: float, finish: Callable[[Modes], Any] = lambda modes: modes
+    scene: Scene,
+    analysis: ModalAnalysis,
+    speed: float,
+    finish: Callable[[Modes], Any] = lambda modes: modes,
+    compiled: dict[str, ModalAnalysis] | None = None,
 ) -> Answers:
     """Return the answers that are the modes of a scene at a speed (rad/s).
 
@@ -110,14 +112,20 @@ def modal_answers(
         analysis: of its own modes, with terms and all that a script adds.
         speed: Ω.
         finish: makes the whole result of an answer.
+        compiled: mesh and theory ↦ analysis, kept for other speeds; None to keep none.
     """
     count = scene.modes.count
 
     def compute(variant: Scene, times: Array | None) -> Modes:
-        problem = analysis.problem.replace(mesh=variant.mesh, theory=variant.model.theory, outputs={})
-        newton = Newton(analysis.newton.tolerance, analysis.newton.max_iterations)
-        there = ModalAnalysis(problem, analysis.about, newton, analysis.comm)
-        there.everyone = analysis.everyone
+        key = repr((variant.mesh, variant.model.theory))
+        there = None if compiled is None else compiled.get(key)
+        if there is None:
+            problem = analysis.problem.replace(mesh=variant.mesh, theory=variant.model.theory, outputs={})
+            newton = Newton(analysis.newton.tolerance, analysis.newton.max_iterations)
+            there = ModalAnalysis(problem, analysis.about, newton, analysis.comm)
+            there.everyone = analysis.everyone
+        if compiled is not None:
+            compiled[key] = there
         most = there.structure.free_unknowns() + int(there.free)
         if "count" in scene.modes.model_fields_set:
             there.check_count(count)
@@ -128,7 +136,11 @@ def modal_answers(
 
 
 def modal_errors(
-    scene: Scene, analysis: ModalAnalysis, spinning: Spinning, solved: Any = None, seconds: float = 0.0
+    scene: Scene,
+    analysis: ModalAnalysis,
+    spinning: Spinning,
+    seconds: float = 0.0,
+    compiled: dict[str, ModalAnalysis] | None = None,
 ) -> Errors:
     """Return the error of modes at one speed; `each` is that of every pair by the mesh.
 
@@ -136,11 +148,11 @@ def modal_errors(
         scene: of the modes.
         analysis: of it.
         spinning: the modes.
-        solved: analysis in a basis that they were computed by, if they were.
         seconds: CPU time that they took, s; 0 if that is not known.
+        compiled: other analyses, kept for other speeds (see `modal_answers`).
     """
-    own = Modes(solved or analysis, spinning, len(spinning.pairs.values))
+    own = Modes(analysis, spinning, len(spinning.pairs.values))
     setting = Setting.of(scene, moving=False)
     degree = analysis.system.V.element.basix_element.degree  # a default differs by cell
     answer = Answer(replace(setting, degree=degree), own, seconds)
-    return estimate(modal_answers(scene, analysis, spinning.speed), answer)
+    return estimate(modal_answers(scene, analysis, spinning.speed, compiled=compiled), answer)

@@ -1,10 +1,17 @@
-"""Modes followed over speed: which mode at one speed is which at the next.
+"""A Campbell diagram: modes at the speeds asked for, followed from each to the next, and what they meet on the way.
 
-Two speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the other, by an
-optimal one-to-one assignment. Where it is weak, or where two modes change places, the branches are followed on the way
-from one to the other through a model of the pencil between them (see `rotfem.analysis.reduced_basis.Between`), which
-costs no further solution. A veering then shows itself as two branches that keep their order, a true crossing as two
-that change it. A speed is inserted where that leaves a branch ambiguous.
+1. The modes are solved at the speeds asked for.
+2. Two neighbouring speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the
+   other, by an optimal one-to-one assignment.
+3. Where it is weak, or where two modes change places, the branches are followed through a model of the pencil between
+   both (see `rotfem.analysis.reduced_basis`), in steps as small as it takes. A veering then shows itself as two
+   branches that keep their order, a true crossing as two that change it.
+4. A speed is inserted where that leaves a branch ambiguous, or where the model is unstable in another way than both.
+5. A branch meets kΩ where it does so in the model. The modes are solved there, and dλ/dΩ gives the last step.
+6. An instability begins and ends where it does so in the model. The modes are solved there, and the model with them
+   gives the next place.
+
+Where the model is that of a basis over the whole range, it is exact, and nothing more is solved in 4 to 6.
 """
 
 from __future__ import annotations
@@ -13,14 +20,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
-from rotfem.analysis.reduced_basis import Between
+from rotfem.analysis.reduced_basis import SpeedModel, between, with_errors
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES
@@ -35,10 +42,9 @@ SURE, AMBIGUOUS = 0.9, 0.5
 #: most of its steps: a veering takes 34.
 FINEST, MOST_STEPS = 1e-5, 200
 
-#: Relative error of zeros of a model, and of those that only say where to solve first; the same of critical speeds and
-#: onsets, by an estimate that is 150 times too small near a veering; iterations for that, usually two.
-ZEROS, FIRST, LOCATED, ITERATIONS = 1e-11, 1e-7, 1e-12, 40
-
+#: Relative error of zeros of a model; of those that only say where to solve, in parts of the distance of two speeds,
+#: and steps from there on after which the next would be below round-off; solutions for one zero, usually one.
+ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 1e-5, 5
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
@@ -160,25 +166,13 @@ def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
     return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
-class ModesBetween(Protocol):
-    """Modes between two speeds without a solution of the whole system."""
-
-    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
-        """Return the modes at both ends in the coordinates of the model."""
-        ...
-
-    def between(self, speed: float) -> Spinning:
-        """Return the modes at a speed, rad/s."""
-        ...
-
-
 class BranchPath:
     """Branches on the way from one solved speed to another, whose `order` is set.
 
     Args:
         left: the first speed, its branches known.
         right: the other one.
-        model: of the pencil between them; made only where it is asked for.
+        model: makes the model between them; called only where it is needed.
         count: number of branches that matter.
 
     Attributes:
@@ -187,97 +181,77 @@ class BranchPath:
         hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
     """
 
-    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], ModesBetween], count: int):
+    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], SpeedModel], count: int):
         self.left, self.right, self.count, self._make = left, right, count, model
-        self.weak: dict[int, float] = {}
-        self.hidden: float | None = None
         self.points = [left, right]
+        self.weak = dict[int, float]()
+        self.hidden: float | None = None
         assign(left, right)
         if self._unsure(left, right):
             self._follow()
 
     @cached_property
-    def model(self) -> ModesBetween:
+    def model(self) -> SpeedModel:
         """Model of the modes between the two speeds."""
         return self._make()
 
-    @cached_property
-    def _ends(self) -> list[SpeedPoint]:
-        """Both points as the model has them."""
-        both = zip((self.left, self.right), self.model.ends(self.left.spinning, self.right.spinning), strict=True)
-        return [replace(point, spinning=spinning) for point, spinning in both]
+    def inside(self, point: SpeedPoint) -> SpeedPoint:
+        """Return a point as the model has it."""
+        return replace(point, spinning=self.model.inside(point.spinning))
 
     def _unsure(self, a: SpeedPoint, b: SpeedPoint) -> bool:
         weak = b.confidence[: self.count][a.order[: self.count] >= 0] < SURE
         return bool(np.any(weak)) or swapped(a, b, self.count)
 
     def _follow(self) -> None:
-        """Follow the branches through the model."""
-        first, last = self._ends
-        self.points, self._steps = [first], 0
-        through = SpeedPoint(self.model.between(last.speed), False)
-        self._advance(through)
-        assign(through, last)  # the same modes, of which the model has more
-        lost, least = last.order < 0, np.min([p.confidence for p in self.points[1:]], axis=0)
+        """Follow the branches through the model, halving each step that is not sure."""
+        last, left, distance = self.inside(self.right), MOST_STEPS, self.right.speed - self.left.speed
+        points, targets = [self.inside(self.left)], [SpeedPoint(self.model.modes(self.right.speed), False)]
+        while targets:
+            before, target = points[-1], targets[-1]
+            assign(before, target)
+            if self._unsure(before, target):
+                if left and target.speed - before.speed > 2 * FINEST * distance:
+                    left -= 1
+                    targets.append(SpeedPoint(self.model.modes(0.5 * (before.speed + target.speed)), False))
+                    continue
+                for b in range(self.count):
+                    if before.order[b] >= 0 and target.confidence[b] < AMBIGUOUS:
+                        self.weak[b] = min(self.weak.get(b, 1.0), float(target.confidence[b]))
+            points.append(targets.pop())
+        least = np.min([p.confidence for p in points[1:]], axis=0)
+        assign(points[-1], last)  # the same modes, of which the model has more
         self.right.order, self.right.conjugate = last.order, last.conjugate
-        self.right.confidence = np.where(lost, 0.0, least)
-        self.points = [self.left, *self.points[1:-1], self.right]
-        count = len(first.spinning.pairs.values)
-        known = {None, unstable(first.spinning), unstable(last.spinning)}
-        hidden = [p for p in self.points[1:-1] if unstable(p.spinning.first(count)) not in known]
+        self.right.confidence = np.where(last.order < 0, 0.0, least)
+        self.points = [self.left, *points[1:-1], self.right]
+        count = len(self.left.spinning.pairs.values)
+        known = {None, unstable(self.left.spinning), unstable(self.right.spinning)}
+        hidden = [p.spinning for p in points[1:-1] if unstable(p.spinning.first(count)) not in known]
         if hidden:
-            self.hidden = max(hidden, key=lambda p: float(np.max(p.spinning.pairs.values.real))).speed
+            self.hidden = max(hidden, key=lambda s: float(np.max(s.pairs.values.real))).speed
 
-    def _advance(self, target: SpeedPoint) -> None:
-        """Append a point of the model, and points before it as long as the step is not sure."""
-        last = self.points[-1]
-        assign(last, target)
-        if self._unsure(last, target):
-            if (
-                target.speed - last.speed > 2 * FINEST * (self.right.speed - self.left.speed)
-                and self._steps < MOST_STEPS
-            ):
-                self._steps += 1
-                self._advance(SpeedPoint(self.model.between(0.5 * (last.speed + target.speed)), False))
-                self._advance(target)
-                return
-            for b in range(self.count):
-                if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS:
-                    self.weak[b] = min(self.weak.get(b, 1.0), float(target.confidence[b]))
-        self.points.append(target)
-
-    def at(self, speed: float) -> SpeedPoint:
-        """Return the modes of the model at a speed, joined with the branches."""
-        left = [self._ends[0], *(p for p in self.points[1:-1] if p.speed <= speed)][-1]
-        point = SpeedPoint(self.model.between(speed), False)
-        assign(left, point)
+    def joined(self, spinning: Spinning) -> SpeedPoint:
+        """Return modes between the two speeds, joined with the branches."""
+        before = [self.left, *(p for p in self.points[1:-1] if p.speed <= spinning.speed)][-1]
+        point = SpeedPoint(self.model.inside(spinning), False)
+        assign(self.inside(before), point)
         return point
 
-    def zeros(
-        self, f: Callable[[SpeedPoint], float], off: float = ZEROS, jumps: bool = False
-    ) -> Iterator[tuple[float, float]]:
-        """Yield the speeds where a function of a point changes its sign, to a relative error, and its sign before.
+    def zeros(self, f: Callable[[SpeedPoint], float], error: float) -> Iterator[float]:
+        """Yield the speeds between where a function of a point changes its sign, to an error in rad/s.
 
-        What it differs by between the modes solved at both ends and those of the model there, is taken off linearly.
-        Where it jumps, as from one mode to another that round-off confuses, there is no zero; all are if it `jumps`.
+        Where it jumps, as from one mode to another that round-off confuses, there is none.
         """
-        (a, b), known = (self.left.speed, self.right.speed), {p.speed: f(p) for p in (self.left, self.right)}
-        apart = [0.0 if jumps else known[x] - f(self.at(x)) for x in (a, b)]
+        known = {p.speed: f(p) for p in self.points}
 
         def g(x: float) -> float:
-            try:
-                value = f(self.at(x))
-            except ComputationError:  # K is singular: this is the speed
-                return 0.0
-            return value + apart[0] + (x - a) / (b - a) * (apart[1] - apart[0])
+            return known[x] if x in known else f(self.joined(self.model.modes(x)))
 
-        known |= {p.speed: g(p.speed) for p in self.points[1:-1]}
-        for (low, before), (high, after) in pairwise(sorted(known.items())):
-            if before * after < 0.0:
-                least = off * max(abs(a), abs(b))
-                speed = brentq(lambda x: known[x] if x in known else g(x), low, high, xtol=least, rtol=off)
-                if jumps or abs(g(speed)) < 1e-2 * min(abs(before), abs(after)) + 1e-6 * abs(speed):
-                    yield float(speed), float(np.sign(before))
+        for low, high in pairwise(known):
+            if known[low] * known[high] < 0.0:
+                speed = float(brentq(g, low, high, xtol=max(error, 1e-300), rtol=ZEROS))
+                if abs(g(speed)) < 1e-2 * min(abs(known[low]), abs(known[high])) + 1e-6 * abs(speed):
+                    yield speed
 
 
 class Sweep:
@@ -287,16 +261,17 @@ class Sweep:
         analysis: compiled scene.
         count: number of branches.
         only: whether no other speeds may be solved than those asked for.
+        model: that of the whole range, if there is one.
 
     Attributes:
         known: speed ↦ modes there that are solved already.
         each: (items, work) ↦ what the work makes of every item; processes may share them out.
         paths: between each two points.
-        solves: speeds solved.
+        solves, inserted: speeds solved, and those that are points though nobody asked for them.
     """
 
-    def __init__(self, analysis: ModalAnalysis, count: int, only: bool = False):
-        self.analysis, self.count, self.only = analysis, count, only
+    def __init__(self, analysis: ModalAnalysis, count: int, only: bool = False, model: SpeedModel | None = None):
+        self.analysis, self.count, self.only, self.model = analysis, count, only, model
         self.known: dict[float, Spinning] = {}
         self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
         self.points, self.paths = list[SpeedPoint](), list[BranchPath]()
@@ -304,16 +279,18 @@ class Sweep:
         self.ambiguous: list[dict[str, float]] = []
 
     @property
-    def is_exact(self) -> bool:
-        """Whether the model between speeds is the analysis itself."""
-        return self.analysis.is_model
+    def final(self) -> bool:
+        """Whether zeros of the model are not to be improved by solutions."""
+        return self.only or self.model is not None
 
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> SpeedPoint:
         """Return the modes at a speed, its equilibrium continued from start."""
-        known = self.known.pop(speed, None)
-        self.solves += known is None
-        found = known or self.analysis.at(speed, self.count + SPARE, start)
-        return SpeedPoint(found.first(self.count + SPARE), requested)
+        found, count = self.known.pop(speed, None), self.count + SPARE
+        self.solves += found is None
+        if found is None and self.model is not None:
+            found = with_errors(self.analysis, self.model.modes(speed, count))
+        found = found or self.analysis.at(speed, count, start)
+        return SpeedPoint(found.first(count), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds.
@@ -338,8 +315,8 @@ class Sweep:
     def _advance(self, target: SpeedPoint) -> None:
         """Append a point, and one before it where the model between cannot tell the branches."""
         last = self.points[-1]
-        path = self._path(last, target)
-        if self._room and (path.hidden is not None or path.weak or self._depends_on_model(path)):
+        path = BranchPath(last, target, lambda: self._model(last.spinning, target.spinning), self.count)
+        if self._room and (path.hidden is not None or path.weak):
             self._insert(path.hidden or 0.5 * (last.speed + target.speed))
             self._advance(target)
             return
@@ -349,27 +326,13 @@ class Sweep:
         self.points.append(target)
         self.paths.append(path)
 
-    def _path(self, left: SpeedPoint, right: SpeedPoint, square: bool = True) -> BranchPath:
-        """Return the way from one point to another; if `square` its model knows the points beside them, too."""
-
-        def model() -> ModesBetween:
-            if self.is_exact:
-                return cast(ModesBetween, self.analysis)
-            points = self.points if square else []
-            beside = [p for p in points if p.speed < left.speed][-1:] + [p for p in points if p.speed > right.speed][:1]
-            known = {p.speed: p.spinning for p in (left, right, *beside) if p.speed * (left.speed + right.speed) >= 0.0}
-            square_too = square and left.speed * right.speed >= 0.0
-            return Between((left.spinning, right.spinning), list(known.values()), square_too)
-
-        return BranchPath(left, right, model, self.count)
-
-    def _depends_on_model(self, path: BranchPath) -> bool:
-        """Return whether a model that is known to be poorer leads the branches elsewhere."""
-        if len(path.points) == 2 or self.is_exact:
-            return False
-        other = replace(path.right)
-        self._path(path.left, other, square=False)
-        return bool(np.any(other.order[: self.count] != path.right.order[: self.count]))
+    def _model(self, left: Spinning, right: Spinning) -> SpeedModel:
+        """Return the model between two speeds, which knows the points beside them, too."""
+        if self.model is not None:
+            return self.model
+        points = [p.spinning for p in self.points]
+        beside = [s for s in points if s.speed < left.speed][-1:] + [s for s in points if s.speed > right.speed][:1]
+        return between((left, right), beside)
 
     def found(self) -> list[float]:
         """Return all frequencies of the branches, rad/s."""
@@ -444,51 +407,38 @@ class Sweep:
         """Return the speeds after the point i where a branch b has the frequency kΩ, and solutions that took."""
         i, b, k = place
         before, self.solves, path = self.solves, 0, self.paths[i]
-
-        def f(point: SpeedPoint) -> float:
-            return self._gap(point, b, k)
-
-        def met(point: SpeedPoint) -> bool:
-            pairs, j = point.spinning.pairs, point.order[b]
-            return k is not None and abs(f(point)) <= pairs.bounds[j] * abs(pairs.values[j])
-
-        off = ZEROS if self.is_exact else FIRST
-        found = [self._located(path, f, speed, sign, met) for speed, sign in path.zeros(f, off)]
-        if f(path.right) == 0.0:
+        error = 0.0 if self.final else FIRST * (path.right.speed - path.left.speed)
+        found = [
+            speed if self.final else self._met(path, b, k, speed)
+            for speed in path.zeros(lambda point: self._gap(point, b, k), error)
+        ]
+        if self._gap(path.right, b, k) == 0.0:
             found.append(path.right.speed)
         taken, self.solves = self.solves, before
         return found, taken
 
-    def _located(
-        self,
-        path: BranchPath,
-        f: Callable[[SpeedPoint], float],
-        speed: float,
-        sign: float,
-        met: Callable[[SpeedPoint], bool] | None = None,
-    ) -> float:
-        """Return the speed on a path where a function of the modes changes its sign, to LOCATED.
-
-        At the speed that the model has, the modes are solved; with them the model is exact there. From one such
-        solution to the next the error is squared, in parts of the distance of the points.
-        """
-        if self.is_exact or self.only:
-            return speed
-        for _ in range(ITERATIONS):
+    def _met(self, path: BranchPath, b: int, k: int | None, speed: float) -> float:
+        """Return where a branch meets kΩ, from the speed at which the model does: Newton's method."""
+        for _ in range(SOLUTIONS):
             try:
-                point = self.solve(speed, path.left.spinning, False)
+                point = path.joined(self.solve(speed, path.left.spinning, False).spinning)
             except ComputationError:  # K is singular: this is the speed
                 return speed
-            part = self._path(path.left, point)
-            if f(point) * sign > 0.0:
-                part = self._path(point, replace(path.right))
-            there = [x for x, s in part.zeros(f, jumps=met is None) if s == sign]
-            if not there or (met is not None and met(point)):
+            pairs, j, gap = point.spinning.pairs, point.order[b], self._gap(point, b, k)
+            if j < 0 or (k is not None and abs(gap) <= pairs.bounds[j] * abs(pairs.values[j])):
                 return speed
-            before, speed = speed, min(there, key=lambda x: abs(x - speed))
-            if (speed - before) ** 2 <= LOCATED * abs(speed) * (path.right.speed - path.left.speed):
+            slope = path.model.slope(point.spinning, j).imag
+            if k is None:
+                slope = -slope if point.conjugate[b] else slope
+            else:
+                slope -= k * np.sign(speed)
+            step = -gap / slope
+            if not path.left.speed < speed + step < path.right.speed:
                 return speed
-        return speed
+            speed += step
+            if abs(step) <= LAST * (path.right.speed - path.left.speed):
+                return float(speed)
+        return float(speed)
 
     def onsets(self) -> list[dict[str, Any]]:
         """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.
@@ -501,9 +451,7 @@ class Sweep:
         if kinds[0] is not None:
             out.append({"speed": self.points[0].speed, "kind": kinds[0], "until": None})
         for path, (before, after) in zip(self.paths, pairwise(kinds), strict=True):
-            if before == after:
-                continue
-            speed = self._changes(path, before, after)
+            speed = None if before == after else self._change(path, before, after)
             if speed is None:
                 continue
             if before is not None and out:
@@ -512,25 +460,34 @@ class Sweep:
                 out.append({"speed": speed, "kind": after, "until": None})
         return out
 
-    def _changes(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
-        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost.
+    def _change(self, path: BranchPath, before: str | None, after: str | None) -> float | None:
+        """Return the speed at which modes are no longer of the kind before; None where growth ends as its mode is lost.
 
         Where growth begins or ends, round-off of a λ near zero may call it static or dynamic.
         """
-        count = len(path.left.spinning.pairs.values)  # a model has more
+        low, high, model, speed = path.left.spinning, path.right.spinning, path.model, np.inf
+        count, least = len(low.pairs.values), 1e-9 * (high.speed - low.speed)  # a model has more modes
 
-        def f(point: SpeedPoint) -> float:
-            kind = unstable(point.spinning.first(count))
-            same = kind == before if before and after else (kind is None) == (before is None)
-            return 1.0 if same else -1.0
+        def same(s: Spinning) -> bool:
+            kind = unstable(s.first(count))
+            return kind == before if before and after else (kind is None) == (before is None)
 
-        places = [speed for speed, sign in path.zeros(f, jumps=True) if sign > 0.0]
-        if not places:
-            return None
-        speed = self._located(path, f, places[0], 1.0)
-        last = path.at(speed - 1e-9 * (path.right.speed - path.left.speed)).spinning.first(count)
-        grows = max((lam.real for lam, _ in growing(last)), default=0.0)
-        return None if after is None and grows > 1e-2 * np.median(np.abs(last.pairs.values)) else speed
+        for _ in range(SOLUTIONS):
+            last, a, b = speed, low.speed, high.speed
+            while b - a > least:
+                middle = 0.5 * (a + b)
+                a, b = (middle, b) if same(model.modes(middle)) else (a, middle)
+            speed = b
+            if self.final or abs(speed - last) <= 1e-6 * abs(speed):
+                break
+            try:
+                solved = self.solve(speed, low, False).spinning
+            except ComputationError:  # K is singular: this is the speed
+                break
+            low, high = (solved, high) if same(solved) else (low, solved)
+            model = self._model(low, high)
+        grows = max((lam.real for lam, _ in growing(model.modes(a, count))), default=0.0)
+        return None if after is None and grows > 1e-2 * np.median(np.abs(low.pairs.values)) else speed
 
 
 def growing(spinning: Spinning) -> list[tuple[complex, str]]:

@@ -6,21 +6,18 @@ unresolved vibrations are noise, and for other schemes where the accelerations a
 
 All unknowns have the same weights, so linear relations between them at both ends, as zero shear strain of a thin plate,
 hold in between.
-
-The acceleration at the end of a march solves M δa = −F(q, v, a), with the factor of M at rest where that converges
-quickly: M of a structure changes little with its deflection.
 """
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.time_grid import CLOSE
+from rotfem.equations.system import System
 
 #: Part of the cubic's largest acceleration by which those of the states may differ from its own.
 KNOWN = 0.5
@@ -73,10 +70,10 @@ def between(old: State, new: State, times: list[float], order: int, comm: MPI.Co
     moved = [x / h**k for k, x in enumerate(derivatives(curve, shares))]
     out = []
     for t, share, q, v, a in zip(times, shares, *moved, strict=True):
-        given = None
-        if old.given is not None and new.given is not None:
-            given = np.asarray(old.given + share * (new.given - old.given))
-        out.append(new.changed(t=t, q=q, v=v, a=a, memory=None, given=given))
+        hub_work = None
+        if old.hub_work is not None and new.hub_work is not None:
+            hub_work = np.asarray(old.hub_work + share * (new.hub_work - old.hub_work))
+        out.append(new.changed(t=t, q=q, v=v, a=a, memory=None, hub_work=hub_work))
     return out
 
 
@@ -117,29 +114,11 @@ def derivatives(curve: Array, x: Array) -> list[Array]:
     return out
 
 
-def end_acceleration(system: Any, state: State) -> Array:
-    """Return q̈ of F(q, q̇, q̈) = 0 at a state, a local dof array; the time is set, the state is written on return.
-
-    Up to eight corrections are made with the factor at rest, while each is a tenth of the last, down to 1e-13.
-    """
-    a = state.a.copy()
-    before, at_rest, left = np.inf, True, 8
-    while True:
-        system.set_state(state.q, state.v, a)
-        change = system.acceleration(at_rest)
-        a += change
-        size, left = system.increment_size(change), left - 1
-        if not at_rest or (before < np.inf and size * size <= 1e-13 * before * system.increment_size(a)):
-            break
-        at_rest = left > 0 and size <= 0.1 * before
-        before = size
-    system.set_state(state.q, state.v, a)
-    return a
-
-
-def write_state(system: Any, state: State) -> None:
+def write_state(system: System, state: State) -> None:
     """Write a state into a system whose time is set, with the acceleration that the equations give at it.
 
     Forces at the root depend on it.
     """
-    system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))
+    system.set_state(state.q, state.v, state.a)
+    if not state.balanced:
+        system.set_state(state.q, state.v, state.a + system.acceleration())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.load_steps import check_inside_out, limited
+from rotfem.analysis.equilibrium import limited
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.errors import ComputationError, InputError
 from rotfem.numerics.eigenproblem import Pencil
@@ -38,7 +38,7 @@ class FirstMotion:
 
     def about(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
         """Return (q, q̇) at t = 0, local dof arrays, about the state that the history starts from."""
-        system = analysis.system.held
+        system = analysis.system
         if self.velocity is not None:
             return q, of_velocities(system, self.velocity)
         signal, patterns = self.of_mode(analysis)
@@ -57,13 +57,13 @@ class FirstMotion:
         The tip moves by one in the direction in which it moves most; then the rates are Re(λᵏ a x e^{iφ}), and the
         patterns are M Re x and M Im x, owned unknowns (k, m), if they have 1 % of the kinetic energy.
         """
-        number, system = self.mode or 1, analysis.system.held
+        number, system = self.mode or 1, analysis.system
         analysis.check_count(number, "initial.mode")
         spinning = analysis.at(system.motion.speed(0.0), number)
         if len(spinning.pairs.values) < number:
             raise InputError("initial.mode", number, f"there are {len(spinning.pairs.values)} modes")
         structure, value = system.structure, spinning.pairs.values[number - 1]
-        x = analysis.right(spinning)[:, number - 1]
+        x = spinning.right[:, number - 1]
         whole = with_ghosts(system.V, x.real) + 1j * with_ghosts(system.V, x.imag)
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
         tip = structure.tip_values(whole)[moves]
@@ -72,7 +72,7 @@ class FirstMotion:
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
         factor = self.amplitude * np.exp(1j * self.phase)
         signal = np.array([(value**k * factor * whole / largest).real for k in range(4)])
-        shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
+        shape, mass = (x / largest, spinning.mass_right[:, number - 1] / largest)
         energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
         return signal, np.array([mass.real, mass.imag])[energies > 1e-2 * energies.sum()]
 
@@ -110,7 +110,7 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
 
     newton.solve(limited(system, q, correction), lambda: float(system.size(q)))
     system.set_state(q, rate, acceleration)
-    check_inside_out(system)
+    system.check_inside_out()
     pencil = Pencil(*system.mass_damping_stiffness())
     forces = pencil.apply(pencil.C, acceleration[:n, None]) + pencil.apply(pencil.M, jerk[:n, None])
     return q, constrained(pencil.K, -np.real(forces[:, 0]), along(rate))

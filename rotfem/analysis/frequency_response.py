@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.equations.clamp import along_axis
 from rotfem.equations.stations import StationChanges
 from rotfem.numerics.linear import ComplexSolver
 from rotfem.numerics.projection import summed
-from rotfem.structures.root_reaction import along_axis
 
 Array = npt.NDArray[Any]
 
@@ -64,7 +64,7 @@ class FrequencyResponse:
         self.names = [name for output in outputs for name in output.names]
         self._given = np.concatenate([output.given + np.zeros(len(output.names)) for output in outputs])
         self.force = np.array(force, dtype=np.complex128)
-        self.force[analysis.system.held.clamped] = 0.0
+        self.force[analysis.system.clamped] = 0.0
         pencil = spinning.pencil
         self.loose = analysis.free or bool(np.any(spinning.pairs.bounds >= 1.0))
         self._solver = ComplexSolver((pencil.K, pencil.C, pencil.M))
@@ -125,12 +125,13 @@ def hub_output(system: Any) -> HarmonicOutput:
 
 def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
     """Return the same as `root_output` where the hub is free, in balance with its equation."""
-    plain, angle, hub, held = root_output(system.held, push), hub_output(system), system.hub, system.held
+    plain, angle, row = root_output(system, push), hub_output(system), system.row
+    assert row is not None
 
     def forces(speed: float, rate: float) -> Array:
-        system.angle.values[:] = 0.0, speed, rate
-        held.set_time(held.time)
-        return np.asarray(summed(system.comm, held.clamp_forces()))
+        row.angle.values[:] = 0.0, speed, rate
+        system.set_time(system.time)
+        return np.asarray(summed(system.comm, system.clamp_forces()))
 
     # Of the second degree in the speed and linear in its rate: these differences are exact.
     by_speed = (forces(speed + 1.0, 0.0) - forces(speed - 1.0, 0.0)) / 2
@@ -138,14 +139,14 @@ def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
 
     def in_balance(values: Array, about_axis: complex) -> Array:
         """Return force and moment with that moment about the axis, of a hub that feels the structure."""
-        if not system.row.coupled:
+        if not row.coupled:
             return values
-        arms, turn = along_axis(held.root.names, held.root.place, held.motion.axis)
+        arms, turn = along_axis(system.root.names, system.root.place, system.motion.axis)
         return np.asarray(values + (about_axis - arms @ values) * turn)
 
     def read(x: Array, s: complex) -> Array:
         (psi,) = angle.read(x, s)
-        about_axis = -(s**2 * hub.inertia + s * hub.damping) * psi
+        about_axis = -(s**2 * row.hub.inertia + s * row.hub.damping) * psi
         return in_balance(plain.read(x, s) + psi * (s * by_speed + s**2 * by_rate), about_axis)
 
     return HarmonicOutput(plain.names, read, in_balance(plain.given, 0.0))

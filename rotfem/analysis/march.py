@@ -12,6 +12,7 @@ H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what i
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from typing import Any
@@ -19,12 +20,14 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.local_error import LocalError
-from rotfem.analysis.schemes import Array, Observer, Pace, Scheme, Stage, State
+from rotfem.analysis.schemes import Array, Observer, Pace, Scheme, Shifts, Stage, State
 from rotfem.analysis.time_grid import Leg, TimeGrid, knots_of
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
+from rotfem.numerics.linear import DirectSolver, combine
 from rotfem.numerics.newton import REACH, Factor, Newton
+from rotfem.numerics.projection import sparse_part, times, with_ghosts
 
 
 @dataclass(frozen=True)
@@ -65,17 +68,32 @@ LONG, SHORT = 6, 3
 #: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps, also of one that was not solved.
 AIM, SHRINK = 0.5, 0.2
 
-#: The longest step, as a part of the end: a history is drawn.
-LONGEST = 0.05
+#: The longest step, as a part of the end: a history is drawn. Steps, rejected ones included, that a march may take.
+LONGEST, MOST_STEPS = 0.05, 500_000
 
-#: Steps, rejected ones included, after which a march is given up; steps over which its mean step is measured.
-MOST_STEPS, MEAN = 500_000, 5000
-
-#: What to do then.
+#: What to do beyond.
 QUICKER = (
-    "time.breakpoints where a function of motion or loads jumps; fixed steps (time.step), which take the mean of what "
-    "is quicker than they are; a looser time.tolerance; or an earlier time.end"
+    "time.breakpoints where a function of motion or loads jumps; "
+    "fixed steps (time.step); a looser time.tolerance; or an earlier time.end"
 )
+
+#: Filters of local errors are made for steps in this ratio.
+COARSE = 1.5
+
+
+@dataclass
+class LastSolution:
+    """What the last solution of a stage says of the next one.
+
+    Attributes:
+        shifts: (1, c_v, c_a) of the tangent whose factor is kept; None where none is.
+        long: whether it took more than LONG tangents; then the next ones have the stresses of `PointStresses`.
+        confirmed: part of the predicted move that it confirmed; the next prediction is shortened to it.
+    """
+
+    shifts: Shifts | None = None
+    long: bool = False
+    confirmed: float = 1.0
 
 
 class March:
@@ -92,21 +110,25 @@ class March:
     Attributes:
         reached: state that an earlier march has yielded, to go on from.
         observers: called with (old state, new state) after every accepted step or part of one.
+        last: what the last solution of a stage says of the next one.
         substeps, rejected: steps that were halved as Newton failed, and adaptive ones that were rejected.
     """
 
     def __init__(
-        self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None, v: Array | None = None
+        self,
+        system: System,
+        scheme: Scheme,
+        steps: Steps,
+        newton: Newton,
+        q: Array | None = None,
+        v: Array | None = None,
     ):
         self.system, self.scheme, self.steps, self.newton = system, scheme, steps, newton
         self.reached: State | None = None
         self.observers = list[Observer]()
         self.substeps = self.rejected = 0
         self._q, self._v = np.zeros_like(system.q.x.array) if q is None else q, v
-        #: Factors (1, c_v, c_a) of the tangent whose factor is kept; whether the last solution was a long one, and the
-        #: part of a predicted move that it confirmed.
-        self._factored: tuple[float, ...] | None = None
-        self._far, self._trust = False, 1.0
+        self.last = LastSolution()
 
     def __iter__(self) -> Iterator[State]:
         """Yield the state at t = 0, unless it goes on from a later one, and at the end of every step.
@@ -159,16 +181,14 @@ class March:
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
         knots = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
-        state, seen, grows, began = start, View(1), True, start.t
+        state, seen, grows = start, View(1), True
 
         def next_leg() -> tuple[Leg, State]:
             leg = self._leg(state, min(pace.h, longest), knots, error, tolerance * pace.largest)
             return leg, self.begun(state, seen, leg) if seen.side else state  # between fits what jumps is negligible
 
         leg, start = next_leg()
-        for number in range(1, MOST_STEPS + 1):
-            if number % MEAN == 0:
-                began = self._check_mean(state.t, began)
+        for _ in range(MOST_STEPS):
             # predict and solve
             with self.system.view.as_in(leg.finish):
                 try:
@@ -205,14 +225,6 @@ class March:
             leg, start = next_leg()
             yield start.changed(pace=pace)
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
-
-    def _check_mean(self, t: float, began: float) -> float:
-        """Return t; refuse a mean step since another time (s) that is far too short to reach the end."""
-        mean = (t - began) / MEAN
-        if self.steps.end - t > 10 * MOST_STEPS * mean:
-            what = f"the last {MEAN} steps were of {mean:.3g} s on average: {MOST_STEPS} do not reach the end"
-            raise ComputationError(what, time=t, advice=QUICKER)
-        return t
 
     def _leg(self, state: State, wanted: float, knots: Array, error: LocalError, allowed: float) -> Leg:
         """Return an interval from a state on that is about as long as wanted.
@@ -283,78 +295,76 @@ class March:
             ComputationError: Newton failed.
         """
         if keep_rotations_small(self.system, self.scheme, state, h):
-            self._factored = None
+            self.last.shifts = None
         start = state if state.jump is None else self._filtered(state, h)
-        new = self.scheme.finish(start, h, self.scheme.solved(start, h, end, self))
+        done = self.scheme.solved(start, h, end, self)
+        for i in range(len(done), self.scheme.stages):
+            done.append(self.solve(self.scheme.stage(i, start, h, end, done), start))
+        new = self.scheme.finish(start, h, done)
         new.reference = start.reference
         self.system.check_reach(new.q, new.t)
-        new.given = self.system.given(new, start)
+        new.hub_work = self.system.hub_work(new, start)
         return new
 
-    def predicted(self, stage: Stage, state: State) -> Array:
-        """Return the predicted q of a stage; where the clamp moves the last shape, turned with it."""
-        clamp, end = self.system.clamp, stage.t if stage.over is None else stage.over.end
-        if clamp is None:
-            return stage.q
-        turned = np.asarray(clamp.turned(state.q, state.v, state.t, end))
-        return turned if stage.over is None else (state.q + turned) / 2
+    def solve(self, stage: Stage, state: State) -> Stage:
+        """Return a stage of a step from a state, solved by Newton's method from its prediction.
 
-    def solve(self, stage: Stage, state: State) -> None:
-        """Solve a stage of a step from a state, by Newton's method from its prediction; if that fails, from the state.
-
-        Of a large system a factor serves as long as increments shrink by it (see `Factor`).
+        Where that fails it starts once more from the state. Of a large system a factor serves as long as increments
+        shrink by it (see `Factor`).
 
         Raises:
             ComputationError: it does not converge, or to a state that is turned inside out.
         """
-        s = self.system if self.system.linear or stage.over is None else self.system.balance
+        s, newton, last, span = self.system, self.newton, self.last, stage.over
         s.set_time(stage.t)
-        if stage.over is not None and s is not self.system:
-            s.begin(stage.over.start, stage.over.end)
-        s.prescribe(stage.t, stage.q, stage.v, stage.a)
-        settles = s.linear and s.settled and not s.current  # the matrix stays from now on, the factor is of another
-        factor = Factor(self._factored == stage.shifts and not settles) if s.keeps_factor else None
-        before, made, move = state.q, 0, stage.q - state.q
-        if self._trust < 1.0 and not s.linear:
-            stage.correct((self._trust - 1.0) * move)
+        if s.clamp is not None:  # which moves the last shape: turned with it
+            turned = s.clamp.turned(state.q, state.v, state.t, stage.t if span is None else span.end)
+            stage.correct((turned if span is None else (state.q + turned) / 2) - stage.q)
+        with nullcontext() if span is None else s.over_step(span.start, span.end, span.start.memory) as balance:
+            s.prescribe(stage.t, stage.q, stage.v, stage.a)
+            move, before, tangents = stage.q - state.q, state.q, 0
+            if last.confirmed < 1.0 and not s.linear:
+                stage.correct((last.confirmed - 1.0) * move)
+            settles = s.linear and s.settled and not s.current  # the matrix stays from now on, the factor is of another
+            keeps = s.keeps_factor and balance is None
+            factor = Factor(last.shifts == stage.shifts and not settles) if keeps else None
 
-        def increment(renewed: bool) -> tuple[float, bool]:
-            """Correct the stage; return the size of the correction, and whether it is exact."""
-            nonlocal before, made
-            s.set_state(stage.q, stage.v, stage.a)
-            far = not s.linear and (self._far or self.newton.diverging or made >= LONG)
-            dq = s.correction(stage.shifts, before if far else None) if renewed else s.chord()
-            made, size = made + renewed, float(s.increment_size(dq))
-            if s.solved_at_once:
-                stage.correct(dq)
-                return size / (float(s.size(stage.q)) or 1.0), renewed or s.current
-            before = stage.q.copy()
-            stage.correct(dq if size <= REACH else dq * (REACH / size))
-            return size, False
+            def increment(renewed: bool) -> tuple[float, bool]:
+                """Correct the stage; return the size of the correction, and whether it is exact."""
+                nonlocal before, tangents
+                s.set_state(stage.q, stage.v, stage.a)
+                far = not s.linear and (last.long or newton.diverging or tangents >= LONG)
+                dq = s.correction(stage.shifts, before if far else None) if renewed else s.chord()
+                tangents, size = tangents + renewed, s.increment_size(dq)
+                if s.solved_at_once:
+                    stage.correct(dq)
+                    return size / (s.size(stage.q) or 1.0), renewed or s.current
+                before = stage.q.copy()
+                stage.correct(dq if size <= REACH else dq * (REACH / size))
+                return size, False
 
-        def size() -> float:
-            return float(s.size(stage.q))
-
-        try:
             try:
-                self.newton.solve(increment, size, factor)
-            except ComputationError:
-                if s.solved_at_once or self._trust == 0.0:
-                    raise
-                self._far, self._trust, before, made = True, 0.0, state.q, 0
-                stage.correct(state.q - stage.q)
-                self.newton.solve(increment, size)
-        except ComputationError as error:
-            self._factored = None
-            raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
-        self._factored = stage.shifts if s.keeps_factor else None
-        self._far = made > LONG
-        if made > SHORT or self._trust < 1.0:
-            self._trust = trusted_part(s, stage.q - state.q, move)
-        if stage.over is not None and s is not self.system:
-            stage.memory = s.finish(stage)
-        if self.newton.diverging and not s.solved_at_once:
-            check_root(self.system, stage)
+                try:
+                    newton.solve(increment, lambda: s.size(stage.q), factor)
+                except ComputationError:
+                    if s.solved_at_once or last.confirmed == 0.0:
+                        raise
+                    last.long, last.confirmed, before, tangents = True, 0.0, state.q, 0
+                    stage.correct(state.q - stage.q)
+                    newton.solve(increment, lambda: s.size(stage.q))
+            except ComputationError as error:
+                last.shifts = None
+                raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
+            last.shifts, last.long = stage.shifts if keeps else None, tangents > LONG
+            if tangents > SHORT or last.confirmed < 1.0:
+                last.confirmed = confirmed_part(s, stage.q - state.q, move)
+            if balance is not None:
+                s.set_state(stage.q, stage.v, stage.a)
+                stage.memory = balance.finish()
+        if newton.diverging and not s.solved_at_once:  # the root may be another one
+            s.set_state(stage.q, stage.v, stage.a)
+            s.check_inside_out(stage.t)
+        return stage
 
     def imbalance(self, stage: Stage) -> Array:
         """Return −F at a stage (see `Equations`)."""
@@ -399,9 +409,9 @@ class March:
             change = np.asarray(s.acceleration())
             new.a += change
             new.jump = change if state.jump is None else state.jump + change
-            new.given = s.given(new)
-        if new.given is not None and state.given is not None:
-            new.given[:2] = state.given[:2]
+            new.hub_work = s.hub_work(new)
+        if new.hub_work is not None and state.hub_work is not None:
+            new.hub_work[:2] = state.hub_work[:2]
         return new
 
     def _filtered(self, state: State, h: float) -> State:
@@ -434,7 +444,7 @@ def too_short(shortest: float, t: float, failure: ComputationError | None = None
     return ComputationError(what, time=t, advice="a looser time.tolerance, a smaller time.min_step, or more damping")
 
 
-def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
+def keep_rotations_small(system: System, scheme: Scheme, state: State, h: float) -> bool:
     """Count rotations from the present shape if a step of h (s) might leave their range; return whether that was done.
 
     The state is changed in place: the same motion in new coordinates. A memory of the scheme that is a second rate, as
@@ -458,7 +468,7 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
     return True
 
 
-def trusted_part(system: Any, move: Array, predicted: Array) -> float:
+def confirmed_part(system: System, move: Array, predicted: Array) -> float:
     """Return the part c of a predicted move p that is closest to the computed move m: m·p/p·p, cut to 0 … 1.
 
     It is 1 where the motion is smooth. Of vibrations that the steps do not resolve a prediction by constant
@@ -469,12 +479,67 @@ def trusted_part(system: Any, move: Array, predicted: Array) -> float:
     return part if part < 0.9 else 1.0
 
 
-def check_root(system: Any, stage: Stage) -> None:
-    """Refuse a solved stage that is turned inside out.
+class LocalError:
+    """Error at the end of a history that a step's local error e leads to if every step were like this one.
 
-    Raises:
-        ComputationError: it is.
+    A vibration of frequency ω and amplitude A has a local error e of C (ωh)ᵐ A in every step. N such steps add up to
+    N C (ωh)ᵐ A, but never to more than 2 A, the vibration in opposite phase: what is small need not be resolved. With
+
+        F = (M + τ C + τ² K)⁻¹ M,    N C (h/τ)ᵐ = 2,    n = (m + 1)/2,
+
+    4 Fⁿ N e is N e/2 where that is 2A, and at most 2.1 · 2A beyond. An unresolved vibration has an e of up to
+    (s ωh)² A, of which F with τ = s h leaves A: it counts with twice its amplitude. The error is the larger
+    of both. With C, motions that strong damping stops within the step are filtered too (as any stiff component: Hairer
+    & Wanner 1996, eq. (IV.8.20)). Matrices are those at the start. Without Fⁿ motions that ring take three to five
+    times the steps.
+
+    Args:
+        system: equations of motion; state and time of the start are set in it.
+        scheme: whose local errors are measured.
+        end: length of the history, s.
     """
-    system.set_state(stage.q, stage.v, stage.a)
-    if not system.linear and system.model.inside_out():
-        raise ComputationError("Newton met a state turned inside out (an axial strain below −1)", time=stage.t)
+
+    def __init__(self, system: System, scheme: Scheme, end: float):
+        self.system, self.end, self.scheme = system, end, scheme
+        system.set_time(0.0, system.model.problem.motion)  # of a free hub the speed it starts with, not of now
+        system.set_state(system.zeros())
+        self._matrices = system.with_hub(system.mass_damping_stiffness())
+        self._owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
+        self._bucket: int | None = None
+        self._solvers: list[DirectSolver] = []
+
+    def __call__(self, error: Array | None, h: float) -> float:
+        """Return the largest displacement of an error of q (local dof array), scaled, at the end of the history."""
+        assert error is not None
+        M, bucket = self._matrices[0], round(np.log(h) / np.log(COARSE))
+        if bucket != self._bucket:
+            self._bucket, self._solvers = bucket, self._made(COARSE**bucket)
+        e = np.full((M.getLocalSize()[0], 1), error[-1])  # the last process has the angle of a hub
+        e[: self._owned, 0] = error[: self._owned]
+        (adds_up, remains), n = self._solvers, (self.scheme.estimate[1] + 1) // 2
+        once, often = remains.solve_all(times(M, e)), e
+        for _ in range(n):
+            often = adds_up.solve_all(times(M, often))
+        sizes = [self.size(with_ghosts(self.system.V, x[: self._owned, 0])) for x in (often, once)]
+        return max(4.0 * self.end / h * sizes[0], 2.0 * sizes[1])
+
+    def _made(self, h: float) -> list[DirectSolver]:
+        """Return the filters of what adds up, and of unresolved vibrations, for steps of h (s)."""
+        (M, C, K), (constant, order, lost) = self._matrices, self.scheme.estimate
+        out = []
+        for tau in (h * (0.5 * constant * self.end / h) ** (1 / order), lost * h):
+            out.append(DirectSolver(combine(sparse_part(M).duplicate(), [M, C, K], np.array([1.0, tau, tau * tau]))))
+        return out
+
+    def size(self, x: Array) -> float:
+        """Return the largest displacement of points of the sections in a local dof array, over the length."""
+        n = len(self.system.scale)
+        return float(self.system.displaced(x[:n]).max() / self.system.structure.length)
+
+    def displacement(self, state: State) -> float:
+        """Return the largest displacement of a state relative to the turning frame, in units of its scale."""
+        q, clamp = state.q[: len(self.system.scale)], self.system.clamp
+        if clamp is not None:
+            x = self.system.V.tabulate_dof_coordinates()[:, 0]
+            q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
+        return max(1e-6, self.size(q))

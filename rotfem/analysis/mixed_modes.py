@@ -29,9 +29,8 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
-from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
-from rotfem.numerics.linear import ROUNDED, set_diagonal
+from rotfem.numerics.linear import ROUNDED, power_of_two, set_diagonal
 from rotfem.numerics.projection import sparse_part, summed
 
 Array = npt.NDArray[Any]

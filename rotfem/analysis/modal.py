@@ -28,12 +28,12 @@ from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotro
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import massed
-from rotfem.equations.nonlinear import assembled
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
+from rotfem.numerics.forms import assembled
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
@@ -42,6 +42,11 @@ Array = npt.NDArray[Any]
 
 #: Part of an eigenvalue that its real part must exceed to count as growth.
 GROWTH = 1e-6
+
+
+def product(A: Array, X: Array) -> Array:
+    """Return A X of real A and complex X; numpy would make A complex first."""
+    return np.asarray((A @ np.ascontiguousarray(X, dtype=complex).view(np.float64)).view(np.complex128))
 
 
 def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dict[str, float]], dict[str, float]]:
@@ -56,7 +61,7 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
         and `effective_mass_1`, … (kg) along the directions of the frame in which the structure moves; and the mass
         (kg) by the same names of directions.
     """
-    system, names = analysis.system.held, list(analysis.structure.unknowns)
+    system, names = analysis.system, list(analysis.structure.unknowns)
     owned = system.V.dofmap.index_map.size_local * len(names)
     energy = kinetic_parts(system.model.mechanics)["T2"]()
     momentum = forms.form(ufl.derivative(energy, system.v, system.structure.k.dq))
@@ -73,7 +78,7 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
     system.set_state(spinning.q[: len(system.q.x.array)])
     momenta = {name: mass_times(r) for name, r in along.items()}
     rows = []
-    for x in analysis.right(spinning)[:owned].T:
+    for x in spinning.right[:owned].T:
         shape = x / max(analysis.comm.allgather(complex(x[np.argmax(np.abs(x))]) if x.size else 0.0j), key=abs)
         mass = sum(float(summed(analysis.comm, part @ mass_times(part))) for part in (shape.real, shape.imag))
         sizes = {name: abs(summed(analysis.comm, p @ shape)) ** 2 for name, p in momenta.items()}
@@ -99,7 +104,7 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
 
 def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
     """Return the relative difference between M, C, K times a vector and central differences of the residual."""
-    system, pencil = analysis.system.held, spinning.clamped
+    system, pencil = analysis.system, spinning.clamped
     zero = system.zeros()
     # A direction without structure: for a mode, K x is what is left when large axial terms cancel.
     system.q.x.array[:] = np.random.default_rng(1).standard_normal(zero.size) * system.scale
@@ -140,6 +145,7 @@ class Spinning:
         clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
         rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
         reference: what the rotations of the equilibrium are counted from; None for the undeformed structure.
+        lift: basis V that the vectors are coordinates in, and M V; None where they are those of the unknowns.
         described: what the modes look like (see `ModalAnalysis.described`).
     """
 
@@ -150,7 +156,24 @@ class Spinning:
     clamped: Pencil
     rigid: bool = False
     reference: Any = None
+    lift: tuple[Array, Array] | None = None
     described: Described | None = None
+
+    def lifted(self, vectors: Array) -> Array:
+        """Return vectors of the pairs as those of the locally owned unknowns, one column each."""
+        return vectors if self.lift is None else product(self.lift[0], vectors)
+
+    @property
+    def right(self) -> Array:
+        """Right vectors of the locally owned unknowns."""
+        return self.lifted(self.pairs.right)
+
+    @property
+    def mass_right(self) -> Array:
+        """M times the right vectors."""
+        if self.lift is None:
+            return self.pencil.apply(self.pencil.M, self.pairs.right)
+        return product(self.lift[1], self.pairs.right)
 
     @cached_property
     def nonzero(self) -> Array:
@@ -199,10 +222,7 @@ class ModalAnalysis:
         estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
-        is_model: whether it is a model of itself between speeds (see `rotfem.analysis.branches.Model`).
     """
-
-    is_model = False
 
     def __init__(
         self,
@@ -254,7 +274,7 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        pencil, clamped = self._pencils(speed, keep)
+        pencil, clamped = self.pencils(speed, q, keep)
         t2 = perf_counter()
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
@@ -264,7 +284,7 @@ class ModalAnalysis:
         if not self.free:
             pairs = self.kept.better(pencil, pairs, count)
         for vectors in (pairs.right, pairs.left):
-            vectors[self.system.held.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
+            vectors[self.system.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": pencil.factored, "eigen": t3 - t2}
         for name, span in spans.items():
@@ -274,32 +294,25 @@ class ModalAnalysis:
             self.system.analysed = pencil.factor
         if keep:
             pencil.factor = None
-        # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
-        clamped.owner = pencil.owner = self
         slowest = int(np.argmin(np.abs(pairs.values)))
         rigid = self.free and pairs.bounds[slowest] >= 1.0
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         chosen = pairs.select(flexible[: massed(clamped.M)])
         return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
 
-    def _pencils(self, speed: float, keep: bool) -> tuple[Pencil, Pencil]:
-        """Return the pencil at the state and speed (rad/s) that are set, and the same with the hub held."""
+    def pencils(self, speed: float, q: Array, keep: bool = True) -> tuple[Pencil, Pencil]:
+        """Return the pencil about a state q (local dof array) at a speed (rad/s), and the same with the hub held."""
+        self.system.set_time(0.0, self.system.motion.at_speed(speed))
+        self.system.set_state(q)
         matrices = self.system.mass_damping_stiffness(keep)
         if self.fixed is not None:
             matrices = self.fixed(matrices, speed)
         clamped = Pencil(*matrices)
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         clamped.unit = pencil.unit = self._unit
-        return pencil, clamped
-
-    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool) -> Spinning:
-        """Return what `at` has found at a speed (rad/s): equilibrium q, pairs, and whether the hub turns freely."""
-        held = self.system.held
-        held.set_time(0.0, held.motion.at_speed(speed))
-        held.set_state(q)
-        pencil, clamped = self._pencils(speed, keep=True)
+        # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
-        return Spinning(speed, q, pencil, pairs, clamped, rigid)
+        return pencil, clamped
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
@@ -328,7 +341,7 @@ class ModalAnalysis:
 
     def equilibrium(self, speed: float, start: Spinning | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
-        s = self.system.held
+        s = self.system
         if self.about == "undeformed" or s.linear:
             s.set_time(0.0, s.motion.at_speed(speed))
             s.set_state(zero := s.zeros())
@@ -337,18 +350,6 @@ class ModalAnalysis:
             s.count_rotations_from(start.reference)
         first = None if start is None else start.q
         return steady_state(s, speed, self.newton, first, self.notes)
-
-    def report(self) -> dict[str, Any]:
-        """Return what a summary says of how the modes were solved; nothing special here."""
-        return {}
-
-    def right(self, spinning: Spinning) -> Array:
-        """Return the eigenvectors of the locally owned unknowns, one column each."""
-        return spinning.pairs.right
-
-    def mass_times(self, spinning: Spinning) -> Array:
-        """Return M times the eigenvectors."""
-        return spinning.pencil.apply(spinning.pencil.M, spinning.pairs.right)
 
     def described(self, spinning: Spinning) -> Described:
         """Return what the modes at a speed look like."""
@@ -369,13 +370,9 @@ class Described:
         self._analysis, self._spinning, self._structure = analysis, spinning, analysis.structure
 
     @cached_property
-    def _right(self) -> Array:
-        return self._analysis.right(self._spinning)
-
-    @cached_property
     def _energies(self) -> Array:
         """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
-        names, X, MX = self._structure.unknowns, self._right, self._analysis.mass_times(self._spinning)
+        names, X, MX = self._structure.unknowns, self._spinning.right, self._spinning.mass_right
         shape = (self._structure.V.dofmap.index_map.size_local, len(names), X.shape[1])
         owned = shape[0] * shape[1]
         x, mx = (self._structure.oriented(Y[:owned].reshape(shape)) for Y in (X, MX))
@@ -403,8 +400,9 @@ class Described:
         """
         axis = np.asarray(self._analysis.system.motion.axis) * (-1.0 if self._spinning.speed < 0.0 else 1.0)
         found = []
-        for x in self._right.T:
-            wave = self._structure.wave(*self._structure.nodes(x), axis)
+        for x in self._spinning.right.T:
+            coordinates, values = self._structure.nodes(x)
+            wave = self._structure.wave(coordinates, values, axis)
             if wave is None:
                 return []
             found.append(wave if self._analysis.fixed is None else replace(wave, fixed=True))
@@ -414,7 +412,7 @@ class Described:
     def names(self) -> list[ModeName]:
         """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
         families, out = [name for name in self.shares if name != "hub"], []
-        for j, x in enumerate(self._right.T):
+        for j, x in enumerate(self._spinning.right.T):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
             name = self._structure.mode_name(first, *self._structure.nodes(x))
             out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)

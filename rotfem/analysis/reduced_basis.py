@@ -1,15 +1,25 @@
-"""Modes over a range of speeds, by a basis of modes at a few of them.
+"""Modes between speeds: a small pencil over speed, in a basis of modes at a few of them.
 
-In a linear theory, with the columns V of modes at some speeds, orthonormal in the stiffness at rest,
-(λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV and VᵀKV, whose pieces (of Omega, Omega², …) are
-projected once. It keeps symmetry and skewness, so it is a pencil like the full one. The basis grows until full
-solutions at speeds between agree. In the other theories the pencil is interpolated between two speeds that are solved,
-to see which modes are one and where a solution is worth its time.
+With the columns V of modes at some speeds, (λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV and VᵀKV,
+which keeps symmetry and skewness. Over the speed Ω these are the polynomials through what they are at some nodes
+(Lagrange):
+
+- In a linear theory they are of second degree in Ω, so three nodes make them exact. The basis grows until full
+  solutions at speeds between agree, and all modes of a diagram are those of one model (`over_range`).
+- In the other theories two speeds that are solved, and those beside them, are the nodes (`between`). K is a polynomial
+  of Ω² then, as the centrifugal force that the equilibrium follows.
+
+With left vectors y and right vectors x,
+
+    dλ/dΩ = − y^H (λ² M' + λ C' + K') x / [ y^H (2λ M + C) x ]
+
+(Adhikari & Friswell 2001).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,11 +28,10 @@ from mpi4py import MPI
 from numpy.linalg import norm
 from scipy.linalg import eigh
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.analysis.modal import ModalAnalysis, Spinning, product
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import unknown_scale
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
-from rotfem.numerics.linear import ROUNDED
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
+from rotfem.numerics.linear import ROUNDED, unknown_scale
 from rotfem.numerics.projection import dense, orthonormal, spanned, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
@@ -31,57 +40,8 @@ Array = npt.NDArray[Any]
 #: Speeds from which a basis saves time: it takes three full solutions at least.
 MANY = 3
 
-#: Modes between two speeds beyond those that are known at both: those that a branch may pass through.
+#: Modes of a model beyond those that are known at its speeds: those that a branch may pass through.
 FURTHER = 3
-
-#: Entries of lifted eigenvectors that are computed together: some ten arrays of 16 MB.
-TOGETHER = 1_000_000
-
-
-def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> ReducedAnalysis | None:
-    """Return the analysis in a basis where that is possible and saves time, else None.
-
-    It is possible of a linear theory in the rotating frame with a fixed hub.
-    """
-    if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
-        return None
-    reduced = ReducedAnalysis(analysis)
-    return reduced if reduced.prepare(speeds[0], speeds[-1], count) else None
-
-
-def product(A: Array, X: Array) -> Array:
-    """Return A X of real A and complex X; numpy would make A complex first."""
-    return np.asarray((A @ np.ascontiguousarray(X, dtype=complex).view(np.float64)).view(np.complex128))
-
-
-class ProjectedPieces:
-    """The matrices of a linear theory, M, C, K = Σ cₚ (piece p), in a basis V: VᵀMV, VᵀCV and VᵀKV.
-
-    Attributes:
-        kinds: "M", "C", "K" ↦ numbers of the pieces of that kind.
-        products: numbers of the pieces ↦ their products with the basis, owned rows (n, m).
-        small: "M", "C", "K" ↦ projected pieces (p, m, m).
-    """
-
-    def __init__(self, system: Any):
-        self.system = system
-        self.kinds = {kind: [i for i, p in enumerate(system.pieces) if p.kind == kind] for kind in "MCK"}
-        self.products: dict[int, Array] = {}
-        self.small: dict[str, Array] = {}
-
-    def project(self, V: Array) -> None:
-        """Project all pieces on a basis, owned rows (n, m)."""
-        comm, m = self.system.comm, V.shape[1]
-        matrices = [i for numbers in self.kinds.values() for i in numbers]
-        self.products = {i: times(self.system.pieces[i].operator, V) for i in matrices}
-        for kind, numbers in self.kinds.items():
-            projected = [summed(comm, V.T @ self.products[i]) for i in numbers]
-            self.small[kind] = np.array(projected).reshape(len(projected), m, m)
-
-    def operators(self, c: Array) -> tuple[Array, Array, Array]:
-        """Return M, C and K (n, m, m) from the factors of all pieces (n, pieces)."""
-        M, C, K = (np.asarray(np.tensordot(c[:, self.kinds[k]], self.small[k], 1)) for k in "MCK")
-        return M, C, K
 
 
 class SmallPencil(Pencil):
@@ -93,15 +53,14 @@ class SmallPencil(Pencil):
 
     Args:
         M, C, K: square arrays.
-        root: R.
         asymmetries: of the full system, how far M and K are from symmetric and C from skew.
     """
 
-    def __init__(self, M: Array, C: Array, K: Array, root: Array, asymmetries: dict[str, float]):
+    def __init__(self, M: Array, C: Array, K: Array, asymmetries: dict[str, float]):
         self.asymmetries = asymmetries
         if self.conservative:  # what a projection lacks of symmetry is round-off
             M, C, K = 0.5 * (M + M.T), 0.5 * (C - C.T), 0.5 * (K + K.T)
-        self.M, self.C, self.K, self._root = M, C, K, root
+        self.M, self.C, self.K = M, C, K
         self.comm, self.spectrum_error = MPI.COMM_SELF, None
 
     def apply(self, A: Any, X: Array) -> Array:
@@ -143,7 +102,9 @@ class SmallPencil(Pencil):
             inverse = np.linalg.inv(np.linalg.cholesky(self.K))
         except np.linalg.LinAlgError:
             return None
-        H, n = self._root @ inverse.T, len(inverse)
+        squares, vectors = np.linalg.eigh(self.M)
+        there = squares > len(inverse) * np.finfo(float).eps * squares[-1]
+        H, n = (vectors[:, there] * np.sqrt(squares[there])).T @ inverse.T, len(inverse)
         S = np.zeros((n + len(H),) * 2, dtype=complex)  # i times the skew matrix, whose lower triangle is read
         S.imag[:n, :n], S.imag[n:, :n] = inverse @ self.C @ inverse.T, -H
         last = min(count, len(H)) - 1
@@ -153,215 +114,147 @@ class SmallPencil(Pencil):
         return -1j / m, x, x
 
 
-def root_of(M: Array) -> Array:
-    """Return R, M = Rᵀ R, of a symmetric matrix; as many rows as M has eigenvalues that are not round-off."""
-    squares, vectors = np.linalg.eigh(M)
-    there = squares > len(M) * np.finfo(float).eps * squares[-1]
-    return np.asarray((vectors[:, there] * np.sqrt(squares[there])).T)
-
-
-class ReducedAnalysis(ModalAnalysis):
-    """Modal analysis of a linear theory in a basis of its own modes; eigenvectors are in its coordinates.
+class SpeedModel:
+    """The modes over speed of a small pencil, whose matrices are polynomials of speed.
 
     Args:
-        full: the compiled scene, of a linear theory.
+        V: basis, owned rows (n, m).
+        nodes: speed (rad/s) and pencil of each place that the polynomials go through.
+        even: whether K is a polynomial of Ω², or else of Ω.
+        count: number of modes.
+        dual: W, (n, m), with WᵀV = 1; None where no modes are given that are not in the basis.
 
     Attributes:
-        checks: speeds of full solutions with the largest relative difference of a frequency found there.
+        lift: V, and M V at the first node.
+        checks: speeds of full solutions, with the largest relative difference of a frequency there.
     """
 
-    is_model = True
-
-    def __init__(self, full: ModalAnalysis):
-        self.full = full
-        self.basis = ProjectedPieces(full.system)
+    def __init__(
+        self, V: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int, dual: Array | None = None
+    ):
+        self.count, self._even, self._dual = count, even, dual
         self.checks: list[dict[str, float]] = []
-        self._columns: list[Array] = []
-        self._asymmetries: dict[str, float] = {}
+        speeds, matrices, self._asymmetries = list[float](), list[list[Array]](), dict.fromkeys("MCK", 0.0)
+        for speed, pencil in nodes:
+            products = [times(A, V) for A in (pencil.M, pencil.C, pencil.K)]
+            if not speeds:
+                self.comm, self.lift = pencil.comm, (V, products[0])
+            speeds.append(speed)
+            matrices.append([summed(pencil.comm, V.T @ AV) for AV in products])
+            self._asymmetries = {k: max(x, pencil.asymmetries[k]) for k, x in self._asymmetries.items()}
+        self._speeds: Array = np.array(speeds)
+        self._matrices: Array = np.array(matrices)
 
-    def __getattr__(self, name: str) -> Any:
-        """Return what the analysis of the full system has under a name."""
-        return getattr(self.full, name)
+    @property
+    def columns(self) -> int:
+        """Number of vectors in the basis."""
+        return int(self.lift[0].shape[1])
 
-    def prepare(self, first: float, last: float, count: int) -> bool:
-        """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
+    def _at(self, speed: float) -> Array:
+        """Return M, C and K at a speed, (3, m, m)."""
 
-        It grows until frequencies halfway between known speeds are those of the full system to 1e-6.
-        """
-        for speed in (first, last):
-            self._add(self._solve(speed, count))
-        self._count = count
-        if self.full.kept.used:  # which the pieces do not keep
-            return False
-        self._project()
-        gaps = [(first, last)]
-        while gaps and len(self.checks) < 7:
-            low, high = gaps.pop(0)
-            middle = 0.5 * (low + high)
-            exact = self._solve(middle, count)
-            found = self.at(middle, count).pairs.values
-            n = min(count, len(found), len(exact.values))
-            error = float(np.max(np.abs(found[:n] - exact.values[:n]) / np.abs(exact.values[:n]), initial=0.0))
-            self.checks.append({"speed": middle, "difference": error})
-            self._add(exact)
-            self._project()
-            gaps += [(low, middle), (middle, high)] if error > 1e-6 else []
-        return not gaps
-
-    def report(self) -> dict[str, Any]:
-        """Return what a summary says of the basis: columns, and the checks."""
-        return {"reduced_basis": {"columns": self.V.shape[1], "checks": self.checks}}
-
-    def _solve(self, speed: float, count: int) -> Eigenpairs:
-        exact = self.full.at(speed, count, keep=False)
-        for name, value in exact.pencil.asymmetries.items():
-            self._asymmetries[name] = max(value, self._asymmetries.get(name, 0.0))
-        return exact.pairs
-
-    def _add(self, pairs: Eigenpairs) -> None:
-        for x in pairs.right.T:
-            self._columns += [x.real, x.imag] if np.max(np.abs(x.imag)) > 0 else [x.real]
-
-    def _project(self) -> None:
-        """Make the columns orthonormal and project every piece."""
-        system, basis = self.system, self.basis
-        # In the inertia instead, directions that have none would be lost.
-        self.V = orthonormal(self.comm, np.array(self._columns).T, lambda X: times(system.material, X))
-        basis.project(self.V)
-        self._index = [i for kind in "MCK" for i in basis.kinds[kind]]
-        self.mass = np.sum([basis.products[i] for i in basis.kinds["M"]], axis=0)
-        self._root = root_of(basis.small["M"].sum(axis=0))
-        stacked = np.hstack([basis.products[i] for i in self._index])
-        self._grams = summed(self.comm, stacked.T @ stacked)
-        self._metric = summed(self.comm, self.V.T @ self.V)
-        self._norms = [float(system.pieces[i].operator.norm()) for i in self._index]
-        self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
-
-    def at(
-        self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
-    ) -> Spinning:
-        """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
-        return self.at_all([speed], count)[0]
-
-    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
-        """Return the modes at two speeds as `between` has them."""
-        return first, last
-
-    def between(self, speed: float) -> Spinning:
-        """Return some more modes of the basis at a speed (rad/s), without their errors in the full system."""
-        return self._small([speed], self._count + FURTHER)[0]
-
-    def _small(self, speeds: Sequence[float], count: int) -> list[Spinning]:
-        """Return the eigenpairs of the basis at some speeds, with errors of the small problem."""
-        zero, motion, out = self.system.zeros(), self.system.motion, []
-        c = np.array([self.system.coefficients(motion.at_speed(speed)) for speed in speeds])
-        for speed, M, C, K in zip(speeds, *self.basis.operators(c), strict=True):
-            pencil = SmallPencil(M, C, K, self._root, self._asymmetries)
-            pencil.owner = self
-            pairs = pencil.solve(min(count, self.V.shape[1] - 1))
-            out.append(Spinning(speed, zero, pencil, pairs, pencil))
-        return out
-
-    def at_all(self, speeds: Sequence[float], count: int) -> list[Spinning]:
-        """Return what `at` does at several speeds, with the errors of all pairs in one go."""
-        part = max(1, TOGETHER // (count * self.system.material.getSize()[0]))
-        if len(speeds) > part:
-            return [s for i in range(0, len(speeds), part) for s in self.at_all(speeds[i : i + part], count)]
-        out = self._small(speeds, count)
-        c = np.array([self.system.coefficients(self.system.motion.at_speed(speed)) for speed in speeds])
-        numbers = [len(s.pairs.values) for s in out]
-        values, right, left = (np.hstack([getattr(s.pairs, n) for s in out]) for n in ("values", "right", "left"))
-        errors = self._backward_errors(values, right, np.repeat(c[:, self._index], numbers, axis=0).T)
-        X = product(self.V, right)
-        lost = self._round_off.stiffness(X if out[0].pencil.conservative else product(self.V, left), X)
-        slopes = np.hstack([s.own.diagonal() for s in out])
-        bounds, ends = relative(lost / np.maximum(np.abs(slopes * values), 1e-300)), np.cumsum(numbers)[:-1]
-        for s, own, bound in zip(out, np.split(errors, ends), np.split(bounds, ends), strict=True):
-            s.pairs.errors, s.pairs.bounds = own, bound + s.pairs.bounds
-        return out
-
-    def right(self, spinning: Spinning) -> Array:
-        """Return the eigenvectors in the unknowns of the mesh."""
-        return product(self.V, spinning.pairs.right)
-
-    def mass_times(self, spinning: Spinning) -> Array:
-        """Return M times the eigenvectors."""
-        return product(self.mass, spinning.pairs.right)
-
-    def _backward_errors(self, values: Array, right: Array, c: Array) -> Array:
-        """Return the normwise backward errors of lifted eigenpairs in the full system, shape (m,).
-
-        Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
-        """
-        power = np.repeat([2, 1, 0], [len(self.basis.kinds[kind]) for kind in "MCK"])
-        factors = c * values ** power[:, None]
-        parts = (factors[:, None, :] * right).reshape(-1, len(values))
-        residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real
-        lengths = np.sum(right.conj() * product(self._metric, right), axis=0).real
-        return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
-
-
-class Between:
-    """Modes between two speeds that are solved, by interpolation of the pencil in a basis of the modes at both.
-
-    M and C are polynomials of the speed Ω through what they are at the nodes, K is one of Ω², as the centrifugal force
-    that the equilibrium follows (Lagrange). At both ends it has the modes that were solved, but
-    for round-off in K.
-
-    Args:
-        both: the modes at the ends.
-        nodes: all that the polynomials go through; both ends among them, and no two speeds of different sign.
-        square: whether K is a polynomial of Ω², or else of Ω.
-    """
-
-    def __init__(self, both: tuple[Spinning, Spinning], nodes: Sequence[Spinning], square: bool = True):
-        pencil, self._square = both[0].pencil, square
-        self._scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
-        # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
-        further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in both]
-        vectors = np.hstack([*(s.pairs.right for s in both), *further]) / self._scale
-        self._comm, self._V = pencil.comm, spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
-        self._speeds = np.array([s.speed for s in nodes])
-        X = self._scale * self._V
-        self._matrices = np.array(
-            [[summed(self._comm, X.T @ times(A, X)) for A in (p.M, p.C, p.K)] for p in (s.pencil for s in nodes)]
-        )
-        self._asymmetries = {name: max(s.pencil.asymmetries[name] for s in both) for name in "MCK"}
-        self._count = max(len(s.pairs.values) for s in both) + FURTHER
-
-    def _pencil(self, speed: float) -> SmallPencil:
         def weights(at: float, places: Array) -> Array:
-            apart = places[:, None] - places
+            apart, there = places[:, None] - places, np.tile(at - places, (len(places), 1))
             np.fill_diagonal(apart, 1.0)
-            there = np.tile(at - places, (len(places), 1))
             np.fill_diagonal(there, 1.0)
             return np.asarray(np.prod(there / apart, axis=1))
 
         plain = weights(speed, self._speeds)
-        squared = weights(speed**2, self._speeds**2) if self._square else plain
-        M, C, K = (
-            np.tensordot(w, A, 1) for w, A in zip((plain, plain, squared), self._matrices.swapaxes(0, 1), strict=True)
-        )
-        return SmallPencil(M, C, K, root_of(0.5 * (M + M.T)), self._asymmetries)
+        squared = weights(speed**2, self._speeds**2) if self._even else plain
+        return np.asarray(np.einsum("ki,ikab->kab", [plain, plain, squared], self._matrices))
 
-    def ends(self, first: Spinning, last: Spinning) -> tuple[Spinning, Spinning]:
-        """Return the modes at both ends as `between` has them."""
-        return self._inside(first), self._inside(last)
+    def _pencil(self, speed: float) -> SmallPencil:
+        M, C, K = self._at(speed)
+        return SmallPencil(M, C, K, self._asymmetries)
 
-    def _coordinates(self, X: Array) -> Array:
-        return np.asarray(summed(self._comm, product(self._V.T, X / self._scale)))
-
-    def _inside(self, s: Spinning) -> Spinning:
-        right, left = (self._coordinates(v) for v in (s.pairs.right, s.pairs.left))
-        pairs, pencil = s.pairs, self._pencil(s.speed)
-        return Spinning(s.speed, s.q, pencil, Eigenpairs(pairs.values, right, left, pairs.errors, pairs.bounds), pencil)
-
-    def between(self, speed: float) -> Spinning:
-        """Return some more modes of the interpolated pencil at a speed (rad/s)."""
-        pencil, count = self._pencil(speed), self._count
+    def modes(self, speed: float, count: int = 0) -> Spinning:
+        """Return modes at a speed (rad/s), their vectors in the basis; by default some more than the model is of."""
+        pencil, count = self._pencil(speed), count or self.count + FURTHER
         try:
             pairs = pencil.solve(count)
         except ComputationError:  # K is singular: aim beside zero
             least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
             pairs = pencil.solve(count, 0.1 * float(np.sqrt(least)))
-        return Spinning(speed, np.empty(0), pencil, pairs, pencil)
+        return Spinning(speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
+
+    def inside(self, s: Spinning) -> Spinning:
+        """Return modes with their vectors in the basis."""
+        if s.lift is self.lift or self._dual is None:
+            return s
+        right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.pairs.right, s.pairs.left))
+        pairs, pencil = replace(s.pairs, right=right, left=left), self._pencil(s.speed)
+        return Spinning(s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
+
+    def slope(self, s: Spinning, j: int) -> complex:
+        """Return dλ/dΩ of a mode in the basis."""
+        h = 1e-4 * float(np.ptp(self._speeds))  # of a polynomial of third degree it differs by 1e-8
+        M, C, K = (self._at(s.speed + h) - self._at(s.speed - h)) / (2 * h)
+        lam, x, y = s.pairs.values[j], s.pairs.right[:, j], s.pairs.left[:, j]
+        return complex(-(y.conj() @ (lam**2 * M + lam * C + K) @ x) / s.own[j, j])
+
+
+def between(both: tuple[Spinning, Spinning], beside: Sequence[Spinning]) -> SpeedModel:
+    """Return the model between two speeds that are solved; it has their modes, but for round-off in K.
+
+    Args:
+        both: modes at the two speeds.
+        beside: modes at speeds beside them, of which those of the same sign are nodes too.
+    """
+    pencil, (low, high) = both[0].pencil, (s.speed for s in both)
+    scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
+    # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
+    further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in both]
+    vectors = np.hstack([*(s.pairs.right for s in both), *further]) / scale
+    inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
+    nodes = {s.speed: s.pencil for s in (*both, *beside) if s.speed * (low + high) >= 0.0}
+    count = max(len(s.pairs.values) for s in both)
+    return SpeedModel(scale * inner, nodes.items(), low * high >= 0.0, count, inner / scale)
+
+
+def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> SpeedModel | None:
+    """Return a model of all modes at some speeds (rad/s) where that is possible and saves time, else None.
+
+    It is possible of a linear theory in the rotating frame with a fixed hub. The basis begins with the modes at both
+    ends, and grows until frequencies halfway between known speeds are those of the full system to 1e-6.
+    """
+    system, first, last = analysis.system, speeds[0], speeds[-1]
+    if not system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
+        return None
+    rest, columns, checks, gaps = system.zeros(), list[Array](), list[dict[str, float]](), [(first, last)]
+
+    def solved(speed: float) -> Array:
+        pairs = analysis.at(speed, count, keep=False).pairs
+        columns.extend([pairs.right.real, pairs.right.imag])
+        return pairs.values
+
+    def model() -> SpeedModel:
+        # Orthonormal in the inertia instead, directions that have none would be lost.
+        V = orthonormal(analysis.comm, np.hstack(columns), lambda X: times(system.material, X))
+        nodes = (first, 0.5 * (first + last), last)
+        return SpeedModel(V, ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in nodes), False, count)
+
+    solved(first)
+    solved(last)
+    if analysis.kept.used:  # which the model does not keep
+        return None
+    found = model()
+    while gaps and len(checks) < 7:
+        low, high = gaps.pop(0)
+        middle = 0.5 * (low + high)
+        exact, near = solved(middle), found.modes(middle, count).pairs.values
+        n = min(count, len(near), len(exact))
+        error = float(np.max(np.abs(near[:n] - exact[:n]) / np.abs(exact[:n]), initial=0.0))
+        checks.append({"speed": middle, "difference": error})
+        found = model()
+        gaps += [(low, middle), (middle, high)] if error > 1e-6 else []
+    found.checks = checks
+    return None if gaps else found
+
+
+def with_errors(analysis: ModalAnalysis, found: Spinning) -> Spinning:
+    """Return modes of a model over a range, with their errors in the full system."""
+    pencil = analysis.pencils(found.speed, analysis.system.zeros(), keep=False)[0]
+    values, right, left = found.pairs.values, found.right, found.lifted(found.pairs.left)
+    values, bounds = RoundOff(pencil).corrected(values, left, right)
+    found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=backward_errors(pencil, values, right))
+    return found

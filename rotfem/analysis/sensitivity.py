@@ -59,7 +59,7 @@ def products(analysis: ModalAnalysis, spinning: Spinning, speed: float) -> Array
     """Return y^H Q(λ) x of every pair, with the parameters that are set, about the equilibrium at a speed (rad/s)."""
     system, pencil, pairs = analysis.system, spinning.pencil, spinning.pairs
     if system.linear:
-        system = AffineSystem(analysis.model, moving=False)
+        system = AffineSystem(analysis.model, False)
         system.set_time(0.0, system.motion.at_speed(speed))
     else:
         analysis.equilibrium(speed, spinning)

@@ -23,14 +23,20 @@ import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.analysis.load_steps import LoadFactors, balance
+from rotfem.analysis.equilibrium import LoadFactors, balance
 from rotfem.analysis.modal import GROWTH
 from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
-from rotfem.numerics.linear import negative_count, negative_eigenvalues, righted, symmetric, use_direct_solver
+from rotfem.numerics.linear import (
+    negative_count,
+    negative_eigenvalues,
+    righted,
+    symmetric,
+    unknown_scale,
+    use_direct_solver,
+)
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 from rotfem.units import speed_text
@@ -103,13 +109,12 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
 
     The state and the speed are left in the system's functions.
     """
-    held = system.held
-    held.set_time(0.0, held.motion.at_speed(speed))
-    held.set_state(q[: len(held.q.x.array)])
-    K = held.matrix(1.0, 0.0, 0.0, 1.0)
+    system.set_time(0.0, system.motion.at_speed(speed))
+    system.set_state(q[: len(system.q.x.array)])
+    K = system.matrix(1.0, 0.0, 0.0, 1.0)
     if negative_count(K) == 0:
         return Stability()
-    matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
+    matrices = (system.matrix(0.0, 0.0, 1.0, 0.0), system.matrix(0.0, 1.0, 0.0, 0.0), K)
     clamped = Pencil(*matrices)
     return stability_of_pencil(clamped if system.hub is None else Pencil(*system.with_hub(matrices)), clamped)
 

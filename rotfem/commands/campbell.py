@@ -22,7 +22,7 @@ from rotfem.accuracy.errors import Errors, warnings_of
 from rotfem.accuracy.modes import modal_errors
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
-from rotfem.analysis.reduced_basis import in_basis
+from rotfem.analysis.reduced_basis import over_range
 from rotfem.commands.advice import frozen_inputs
 from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
@@ -141,16 +141,11 @@ def diagram(
     """Return the branches over speed, with what the diagram says."""
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, hint, fastest)
-    own, reduced = analysis, in_basis(analysis, values, count + SPARE)
-    analysis = reduced or analysis
-    sweep = Sweep(analysis, count, only)
-    if reduced is not None:
-        sweep.known = dict(zip(values, reduced.at_all(values, count + SPARE), strict=True))
-        sweep.solves += len(values)
-    elif kept is not None:
+    sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
+    if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
     if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if reduced is None:
+        if sweep.model is None:
             left = [speed for speed in values if speed not in sweep.known]
             sweep.known |= solved_by_all(analysis, left, count, progress)
             sweep.solves += len(left)
@@ -170,7 +165,7 @@ def diagram(
         orders, crossings, onsets = meetings(sweep, scene)
     count = sweep.count
     labels = branch_labels(analysis, sweep, count)
-    errors = branch_errors(scene, own, analysis, sweep, count) if analysis.estimates else None
+    errors = branch_errors(scene, analysis, sweep, count) if analysis.estimates else None
     mesh = None if errors is None else errors.each
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
@@ -211,7 +206,11 @@ def diagram(
         "speeds_solved": sweep.solves,
         **({} if errors is None else {"error": errors.summary()}),
         "checks": self_checks(analysis, sweep.points[-1].spinning),
-        **analysis.report(),
+        **(
+            {}
+            if sweep.model is None
+            else {"reduced_basis": {"columns": sweep.model.columns, "checks": sweep.model.checks}}
+        ),
         "lowest_frequency": min((w for w in sweep.found() if w > 0), default=0.0),
         "warnings": warnings,
         "advice": hints,
@@ -269,7 +268,9 @@ class FinishedSpeeds:
         out = {}
         for i, speed in enumerate(arrays["speeds"].tolist()):
             pairs = Eigenpairs(*(arrays[f"{name}_{i}"] for name in PAIRS))
-            out[speed] = analysis.restored(speed, arrays[f"q_{i}"], pairs, bool(arrays["rigid"][i]))
+            q = arrays[f"q_{i}"]
+            pencil, clamped = analysis.pencils(speed, q)
+            out[speed] = Spinning(speed, q, pencil, pairs, clamped, bool(arrays["rigid"][i]))
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
@@ -321,7 +322,7 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
         + ("on" if onset["until"] is None else f"to {speed_text(onset['until'], 8)}")
         for onset in onsets
     ]
-    if sweep.only and not sweep.is_exact:
+    if sweep.only and sweep.model is None:
         out.append("critical speeds and onsets of instability are interpolated between the speeds that were solved")
     return out + [f"at {speed_text(last.speed)}, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
@@ -343,13 +344,13 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def branch_errors(scene: Scene, analysis: ModalAnalysis, solved: ModalAnalysis, sweep: Sweep, count: int) -> Errors:
+def branch_errors(scene: Scene, analysis: ModalAnalysis, sweep: Sweep, count: int) -> Errors:
     """Return the errors of the branches, the larger ones of those at both ends; `each` is that by the mesh."""
-    found, each = list[Errors](), list[list[float]]()
+    found, each, compiled = list[Errors](), list[list[float]](), dict[str, ModalAnalysis]()
     for point in (sweep.points[0], sweep.points[-1]):
         order = [int(i) for i in point.order[:count]]
         # What the mesh does to modes far above would be taken for errors of these.
-        found.append(modal_errors(scene, analysis, point.spinning.first(1 + max(order)), solved))
+        found.append(modal_errors(scene, analysis, point.spinning.first(1 + max(order)), compiled=compiled))
         there = found[-1].each
         each.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
     worst = max(found, key=lambda errors: np.inf if errors.total is None else errors.total)

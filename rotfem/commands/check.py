@@ -13,8 +13,7 @@ from mpi4py import MPI
 from rotfem.commands.fields import BETWEEN, columns_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, summary
-from rotfem.equations.functionals import rigid_body
-from rotfem.equations.model import Model
+from rotfem.equations.model import Model, rigid_body
 from rotfem.errors import input_of
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory

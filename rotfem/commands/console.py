@@ -5,6 +5,7 @@ Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
 
 from __future__ import annotations
 
+import gc
 import io
 import logging
 import os
@@ -14,7 +15,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
-from importlib.util import find_spec
+from functools import partial
 from pathlib import Path
 from textwrap import wrap
 from time import monotonic, sleep
@@ -28,19 +29,13 @@ from rotfem.listeners import ONE_PROCESS
 if TYPE_CHECKING:
     from rotfem.results import Result
     from rotfem.results.result_set import ResultFolder, Writer
+    from rotfem.scene import Scene
 
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
 
 #: Whether commands run on this process alone, whatever others mpirun has started.
 ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
-
-
-def missing() -> str:
-    """Return the message where a module of FEniCSx is missing; empty where none is."""
-    names = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
-    absent = next((name for name in names if find_spec(name) is None), "")
-    return absent and f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"
 
 
 def folded(text: str, at_terminal: bool) -> str:
@@ -58,35 +53,43 @@ class Session:
     It prints JSON of the summary and nothing else on stdout, errors only if it is quiet, and tracebacks to debug.
 
     Attributes:
+        comm: processes of the command.
         bar: progress of the computation.
+        scene: what it computes, of a verb on a scene.
+        results: folder where its results go, of those that have one.
+        hint: receives advice; None where none is wanted.
+        report: whether report.html is wanted.
     """
 
-    def __init__(self, as_json: bool = False, quiet: bool = False, debug: bool = False):
+    scene: Scene
+    results: ResultFolder
+    hint: Callable[[str], None] | None = None
+    report = False
+
+    def __init__(self, as_json: bool = False, quiet: bool = False, debug: bool = False, no_plots: bool = False):
         self.comm: Any = ONE_PROCESS
         with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
             from mpi4py import MPI
 
             self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
-        self.as_json, self.quiet, self.debug = as_json, quiet, debug
+        self.as_json, self.quiet, self.debug, self.plots = as_json, quiet, debug, not no_plots
         self.first = self.comm.rank == 0
         self.bar = ProgressBar()
-        self._folder: ResultFolder | None = None
         self._made: list[Path] = []
-        self._warned = 0
+        self._warned, self._shown = 0, False
 
     def __enter__(self) -> Session:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")  # not every terminal has every letter
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         self._unit = units.SPEED.set("rad/s")
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.bar.stop()
         units.SPEED.reset(self._unit)
-        if self._folder is not None:
-            self._folder.close(error)
+        if hasattr(self, "results"):
+            self.results.close(error)
         if error is not None:  # remove the folders that this command made, the innermost first, if they are empty
             with suppress(OSError):
                 for made in self._made:
@@ -126,11 +129,10 @@ class Session:
         """Return where results are of a command that did not end well, and how it goes on; empty where none are."""
         from rotfem.results.result_set import kept_in
 
-        if self._folder is None:
+        if not hasattr(self, "results"):
             return ""
-        path = self._folder.path
-        found = kept_in(path) if self._folder.summary else []
-        return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
+        found = kept_in(self.results.path) if self.results.summary else []
+        return "; ".join(["", f"results until then are in {self.results.path}", *found]) if found else ""
 
     def _end(self, message: str, status: int, alone: bool = False) -> NoReturn:
         """End this process, at once where the others may be waiting for it, or gone."""
@@ -140,13 +142,19 @@ class Session:
         raise SystemExit(status) from None
 
     def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
-        """Return the result folder, made where it is not there."""
+        """Return the result folder, made where it is not there; from now on signals end a command with its results."""
         from rotfem.results.result_set import ResultFolder
 
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        if not gc.isenabled():  # see `rotfem.__main__`
+            gc.freeze()
+            gc.enable()
+        if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
-        self._folder = ResultFolder(self.comm, path, command, inputs)
-        return self._folder
+        self.results = ResultFolder(self.comm, path, command, inputs)
+        return self.results
 
     def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
         """See that the file of an option can be written, before anything is computed, and is none that was read."""
@@ -167,45 +175,47 @@ class Session:
         if self.first:
             self.bar.print(line)
 
-    def hint(self, unwanted: bool) -> Callable[[str], None] | None:
-        """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
-        return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
+    def advise(self, line: str) -> None:
+        """Print a line of advice on stderr."""
+        self.remark(f"hint: {line}")
 
-    def finish(self, result: Result, plots: bool, further: Sequence[Writer] = (), last: bool = True) -> None:
-        """Write a result, its figures and what else is wanted; print it unless it failed. The last one is complete."""
-        from rotfem.commands.printed import report
+    def finish(self, result: Result, further: Sequence[Writer] = (), last: bool = True) -> None:
+        """Write a result, its figures and what else is wanted, and print it unless it failed.
 
-        assert self._folder is not None
+        One that is not the last waits for its error; after it, the last one is written and printed with that alone.
+        """
+        from rotfem.commands.printed import of_error, report
+
+        if self.report and last:
+            further = [*further, self._page(result)]
         self.bar.describe("writing results and figures")
-        problems = self._folder.write(result, plots, further)
+        write, again = self.results, self._shown
+        problems = write.add(result, further) if again else write.write(result, self.plots, further)
+        self._shown = not last
         self.bar.stop()
         if last:
             self.print_json(result.summary)
-        self._warn(result)
-        if problems:
-            raise problems[0]
-        if result.status == "done":
-            self.say([*report(result), f"results in {self._folder.path}"])
-
-    def complete(self, result: Result, further: Sequence[Writer] = ()) -> None:
-        """Write the summary of a result again, now with its error, and what else is wanted; print the error."""
-        from rotfem.commands.printed import of_error
-
-        assert self._folder is not None
-        folder = self._folder
-        problems = folder.add(result, further)
-        self.print_json(result.summary)
-        self._warn(result)
-        if problems:
-            raise problems[0]
-        self.say(of_error(result.summary))
-
-    def _warn(self, result: Result) -> None:
-        """Print the warnings of a result that have not been printed."""
-        if not self.quiet:
-            for warning in result.summary["warnings"][self._warned :]:
+        for warning in result.summary["warnings"][self._warned :]:
+            if not self.quiet:
                 self.remark(f"warning: {warning}")
         self._warned = len(result.summary["warnings"])
+        if problems:
+            raise problems[0]
+        if again:
+            self.say(*of_error(result.summary))
+        elif result.status == "done":
+            self.say(*report(result), f"results in {self.results.path}")
+
+    def _page(self, result: Result) -> Writer:
+        """Return what writes report.html of a result, with a drawing of the scene's structure."""
+        from rotfem.commands.check import check
+        from rotfem.results.report import write_report
+
+        drawing = None
+        if result.summary["command"] != "check":
+            with suppress(InputError, ComputationError):
+                drawing = check(self.scene, comm=self.comm).plot()
+        return partial(write_report, result, drawing)
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""
@@ -215,7 +225,7 @@ class Session:
             sys.stdout.write(json_text(summary))
             self._pass_on()
 
-    def say(self, lines: list[str]) -> None:
+    def say(self, *lines: str) -> None:
         """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
             self.bar.stop()
@@ -235,8 +245,6 @@ class ProgressBar:
         self._bar: Any = None
         self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
         self._started, self._due = monotonic(), LONG
-        #: When (s after the start) the first share was done, and that share.
-        self._first: tuple[float, float] | None = None
 
     def start(self) -> None:
         """Draw the bar, which moves by itself until there is progress; it says so when equations are compiled."""
@@ -277,22 +285,12 @@ class ProgressBar:
         else:
             print(folded(line, sys.stderr.isatty()), file=sys.stderr, flush=True)
 
-    def says(self, line: str) -> None:
-        """Print a line that is a kind of progress."""
-        if self._wanted:
-            self.print(line)
-
     def __call__(self, share: float) -> None:
         """Take note of the share of the work that is done: in the bar, or in lines at doubled times."""
         if self._bar is not None and share > 0.0:
             self._bar.update(0, description=self._title, total=1.0, completed=share, percent=f"{100 * share:3.0f} %")
-        if self._bar is not None or not self._wanted:
-            return
         now = monotonic() - self._started
-        if self._first is None:  # compilation is over
-            self._first, self._due = (now, share), max(self._due, now + LONG / 2)
-        since, before = self._first
-        if now >= self._due and before < share < 1.0:
+        if self._bar is None and self._wanted and now >= self._due and 0.0 < share < 1.0:
             self._due = 2 * now
-            left = (1.0 - share) * (now - since) / (share - before)
+            left = now * (1.0 / share - 1.0)
             self.print(f"{self._title}: {100 * share:.3g} % after {now:.0f} s, about {left:.3g} s to go")

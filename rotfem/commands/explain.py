@@ -1,9 +1,9 @@
 """`rotfem explain`: which effects and which theory a scene calls for, and what each of them changes.
 
-The change of an output is the distance of two plain answers in one setting (`rotfem.results.distance`): with and without
-an effect, or in another theory. The setting is the first one, from half the cells and a loose tolerance on, whose own
-answer is near to that of the next finer one. Steps are then of equal length, as many as the adaptive ones of the own
-model, so that errors by steps cancel in the difference.
+The change of an output is the distance of two answers in one setting: with and without an effect, or in another theory.
+The setting is the first one, from half the cells and a loose tolerance on, whose own answer is near to that of the next
+finer one. Steps are then of equal length, as many as the adaptive ones of the own model, so that errors by steps cancel
+in the difference.
 """
 
 from __future__ import annotations
@@ -266,8 +266,8 @@ class Explanation:
         if key not in self._systems:
             system = self._systems[key] = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
             if system.linear:
-                system.held.check_terms()
-        self._systems[key].leave_out(set(self.effects) - set(problem.effective_effects()))
+                system.check_terms()
+        self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
         return self._systems[key]
 
     def _of(self, variant: Scene) -> tuple[Problem, Any, Newton]:
@@ -422,17 +422,16 @@ class Output:
 
 def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
     """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
-    held = system.held
-    if held.linear:
+    if system.linear:
         return compute()
-    held.plain = True
+    system.plain = True
     try:
         return compute()
     except ComputationError:
-        held.plain = False
+        system.plain = False
         return compute()
     finally:
-        held.plain = True
+        system.plain = True
 
 
 # --- the settings of a comparison -------------------------------------------------------------------------------------
@@ -529,11 +528,10 @@ def groups(of: Explanation) -> dict[str, float]:
 
 def _frequencies_at_rest(system: Any, count: int) -> Array:
     """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
-    held = system.held
-    held.set_time(0.0, held.motion.at_speed(0.0))
-    held.set_state(held.zeros())
+    system.set_time(0.0, system.motion.at_speed(0.0))
+    system.set_state(system.zeros())
     try:
-        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, count)).resolved))
+        return np.sort(np.abs(Pencil(*system.mass_damping_stiffness()).solve(max(2, count)).resolved))
     except ComputationError:
         return np.empty(0)
 

@@ -53,8 +53,8 @@ def fields_writer(system: Any, states: list[tuple[float, Array]], more: Named | 
     structure = system.structure
 
     def displacement(t: float, q: Array) -> Array:  # in the turning frame
-        coordinates, values = structure.nodes(q[: len(system.held.zeros())])
-        return moved(structure, system.held.seen_from_hub(values, coordinates["x"], t))
+        coordinates, values = structure.nodes(q[: len(system.zeros())])
+        return moved(structure, system.seen_from_hub(values, coordinates["x"], t))
 
     def write(folder: Path) -> list[Path]:
         """Gather the displacements, and write them on rank 0."""
@@ -63,7 +63,7 @@ def fields_writer(system: Any, states: list[tuple[float, Array]], more: Named | 
             names, further = more
             for (_, fields), (_, values) in zip(frames, further, strict=True):
                 fields.update(zip(names, values.T, strict=True))
-        points = structure.places(structure.nodes(system.held.zeros())[0])
+        points = structure.places(structure.nodes(system.zeros())[0])
         surface = structure.surface()
         cells = chain(len(points)) if surface is None else surface
         return write_xdmf(folder / "fields.xdmf", points, cells, frames) if system.comm.rank == 0 else []

@@ -64,10 +64,9 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> S
     if problem.frame == "inertial":
         system = compile_system(problem.replace(frame="rotating"), system.comm, moving=False)
     if speed == 0.0:
-        held = system.held
-        held.set_time(0.0, held.motion.at_speed(0.0))
-        held.set_state(held.zeros())
-        if not held.residual().norm() > 0.0:  # nothing acts on it
+        system.set_time(0.0, system.motion.at_speed(0.0))
+        system.set_state(system.zeros())
+        if not system.residual().norm() > 0.0:  # nothing acts on it
             return start
 
     def found(system: Any, notes: list[str]) -> Array:

@@ -37,7 +37,7 @@ def import_blade(file: str | Path, format: str | None = None, changes: Sequence[
         key: value for key, value in plain(read).items() if key in read.model_fields_set
     }
     imported = Scene.from_dict({**tables, "structure": structure}, path.stem)
-    imported._hints = scene._hints
+    imported._hints, imported._inputs = scene._hints, scene._inputs
     return imported
 
 

@@ -1,12 +1,9 @@
-"""Ctrl-C and SIGTERM: in a march obeyed between steps, by all ranks; while modules are imported held back."""
+"""Ctrl-C and SIGTERM: in a march obeyed between steps, by all ranks."""
 
 from __future__ import annotations
 
-import gc
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -17,31 +14,6 @@ if TYPE_CHECKING:
 
 #: Ctrl-C, and what ends a process politely.
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-
-@contextmanager
-def importing() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait, as in the middle of an import what they raise becomes any error.
-
-    No garbage is collected: what is imported stays, and is seen no more.
-    """
-    heard: list[tuple[int, FrameType | None]] = []
-    main = threading.current_thread() is threading.main_thread()
-    before = {n: signal.signal(n, lambda *given: heard.append(given)) for n in SIGNALS if main}
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    for first, frame in heard[:1]:
-        handler = before[signal.Signals(first)]
-        if callable(handler):
-            handler(first, frame)
-        elif handler == signal.SIG_DFL:
-            signal.raise_signal(first)
 
 
 def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:

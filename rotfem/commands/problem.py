@@ -112,29 +112,30 @@ class Moment:
 
 def hub_values(system: Any, state: State) -> dict[str, float]:
     """Return the values of a free hub at a state that is written into the system (see `Moment.hub`)."""
-    if system.hub is None:
+    row = system.row
+    if row is None:
         return {}
-    work, impulse = (0.0, 0.0) if state.given is None else map(float, state.given[:2])
-    own = {"torque": system.row.torque(state.t, after=True), "hub_kinetic": system.row.kinetic()}
-    return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}
+    work, impulse = (0.0, 0.0) if state.hub_work is None else map(float, state.hub_work[:2])
+    own = {"torque": row.torque(state.t, after=True), "hub_kinetic": row.kinetic()}
+    return {**own, "angular_momentum": row.angular_momentum(), "impulse": impulse, "work": work}
 
 
 def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
     """Return the shape that a motion starts from (local dof array), and set the reference rotation of the system."""
     if start is None:
         return None
-    held, reference = system.held, None
+    reference = None
     q = np.asarray(start.state.q if isinstance(start, Moment) else start)
     if isinstance(start, Moment):
-        source, reference = start.system.held, start.state.reference
+        source, reference = start.system, start.state.reference
         q = q[: len(source.zeros())]
-        if reference is not None and held.structure.turns is None:
+        if reference is not None and system.structure.turns is None:
             source.count_rotations_from(reference)
             q, reference = source.structure.total(q), None
-    if q.shape != held.zeros().shape:
-        allowed = f"must have the {len(held.zeros())} unknowns of this structure and mesh on this process"
+    if q.shape != system.zeros().shape:
+        allowed = f"must have the {len(system.zeros())} unknowns of this structure and mesh on this process"
         raise InputError("start", f"{q.size} unknowns", allowed)
-    held.count_rotations_from(reference)
+    system.count_rotations_from(reference)
     return q
 
 
@@ -306,7 +307,7 @@ def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
     given = m.base_acceleration
-    base = None if given is None else load_of("motion.base_acceleration", given, scene.structure)
+    base = None if given is None else load_of("motion.base_acceleration", given, scene.structure, float)
     more = {
         "base_acceleration": no_acceleration if base is None else base.at,
         "is_accelerated": base is not None and not base.is_zero,

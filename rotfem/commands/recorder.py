@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.conditioning import Farthest
 from rotfem.analysis.dense_output import write_state
+from rotfem.analysis.equilibrium import Farthest
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
@@ -221,7 +221,7 @@ class Recorder:
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
         root, further = (f"root_{name}" for name in system.root.names), tuple(system.model.problem.outputs)
         named = output.resultants(system.structure.type)
-        self.resultants = ResultantRows(system.held, named) if named else None
+        self.resultants = ResultantRows(system, named) if named else None
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
         pitch = () if system.motion.pitch is None else ("pitch",)
@@ -244,7 +244,7 @@ class Recorder:
     def row(self, state: State) -> list[float]:
         """Return the row of a state; stations and plates keep what they have of it."""
         system, t = self.system, state.t
-        system.held.show_time(t)
+        system.set_time(t)
         write_state(system, state)
         energy, motion = system.energies(), system.motion
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]

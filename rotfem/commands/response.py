@@ -35,7 +35,7 @@ from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
-from rotfem.mechanics.loads import AnyLoad, Loads, PlaceLoad, Term
+from rotfem.mechanics.loads import Load, Loads, PlaceLoad, Term
 from rotfem.mechanics.motion import Motion
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult
@@ -107,7 +107,7 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
 
     The equilibrium is left in the system.
     """
-    system, motion = analysis.system.held, analysis.system.held.motion.at_speed(spinning.speed)
+    system, motion = analysis.system, analysis.system.motion.at_speed(spinning.speed)
     forces, held, moments, q = [], [], list[Any](), spinning.q
     if system.linear and analysis.about == "steady":  # a load prestresses what is displaced
         q = steady_state(system, spinning.speed, analysis.newton, notes=[])
@@ -276,7 +276,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
         raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
-    swept: dict[str, AnyLoad] = {}
+    swept: dict[str, Load] = {}
     for name, load in changing.items():
         if isinstance(load, PlaceLoad) or any(t.amplitudes is not None and t.phase is None for t in load.terms):
             raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")

@@ -36,14 +36,13 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, computing, silent
 from rotfem.mechanics.effects import Work
-from rotfem.mechanics.problem import Functional
+from rotfem.mechanics.problem import Functional, inactive_unknowns
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Series
 from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.structures.symmetry import inactive_unknowns
 from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
@@ -283,7 +282,7 @@ class Simulation:
         if self.march is None:
             return error
         if self.log.steps == 0:
-            self.system.held.model.check_smooth()
+            self.system.model.check_smooth()
         if self.system.hub is not None and self.system.hub.torque.controlled:
             what = f"{error.what}; where a torque jumps with the motion, the equations of a step may have no solution"
             return ComputationError(what, error.time, SMOOTHER)

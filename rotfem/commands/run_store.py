@@ -45,7 +45,8 @@ REMEMBERED = {
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
     "record.resultants.frames": ("kept", "_every", "_count"),
-    "march": ("substeps", "rejected", "_far", "_trust"),
+    "march": ("substeps", "rejected"),
+    "march.last": ("long", "confirmed"),
     "march.newton": ("iterations", "roundoff", "_kappa", "_longest"),
 }
 

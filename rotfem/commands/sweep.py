@@ -1,7 +1,7 @@
 """`rotfem sweep`: a verb over a grid of scene keys, on one or several processes or ranks; a killed sweep goes on.
 
 Every point has a folder of its own, named after all that its result depends on, with the result as the verb writes it.
-A point is settled when its summary says done or failed. The table sweep.csv grows with them.
+A point whose summary says done or failed is not computed again. The table sweep.csv grows with them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import hashlib
 import json
 import multiprocessing
 import os
-import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -28,9 +27,9 @@ import typer
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
+import rotfem.numerics  # noqa: F401  starts PETSc, which all ranks do together
 from rotfem.commands.console import ALONE
-from rotfem.commands.job import app
-from rotfem.commands.processes import raise_first
+from rotfem.commands.verbs import app
 from rotfem.errors import ComputationError, InputError, OutputError
 from rotfem.listeners import Progress
 from rotfem.results.files import write_text
@@ -38,13 +37,11 @@ from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
 from rotfem.scene import load_scene
 from rotfem.scene.extensions import load, loaded
+from rotfem.units import unit_of
 from rotfem.version import __version__, versions
 
 #: Verbs that can be swept.
 VERBS = ("run", "modes", "campbell", "response", "check")
-
-RANGE = re.compile(r"([^:,]+):([^:,]+):(\d+)\s*([^\d\s].*)?")
-WITH_UNIT = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?+)\s*([^-+.\d\s].*)")
 
 
 @dataclass(frozen=True)
@@ -63,39 +60,27 @@ class Point:
     def row(self, reason: str = "") -> dict[str, Any]:
         """Return its row: values of the keys, what was computed, how it went; or why nothing was."""
         summary = read_summary(self.folder)
-        status, found = summary.get("status"), quantities(summary) if summary.get("status") == "done" else {}
-        reason = summary["failure"]["what"] if status == "failed" else reason
-        went = {"status": status or "failed", "reason": reason, "seconds": summary.get("timings", {}).get("total", 0.0)}
+        status = summary.get("status", "failed")
+        found = quantities(summary) if status == "done" else {}
+        went = {"status": status, "reason": summary["failure"]["what"] if "failure" in summary else reason}
+        went["seconds"] = summary.get("timings", {}).get("total", 0.0)
         return {**self.values, **found, **went, "folder": self.folder.name}
 
 
 def values_of(text: str) -> list[Any]:
     """Return the values of "first:last:number" or "a,b,…", with a unit at the end; the text where it is one value."""
-    if found := RANGE.fullmatch(text):
-        first, last, number, unit = found.groups()
-        try:
-            values = [float(f"{value:.12g}") for value in np.linspace(float(first), float(last), int(number))]
-            whole = "." not in first + last and all(value == round(value) for value in values)
-        except (ValueError, OverflowError):
-            raise InputError("sweep --set", text, "must be first:last:number, of numbers") from None
-        numbers = list(map(round, values)) if whole else values
-        return [f"{value!r} {unit}" for value in numbers] if unit else list(numbers)
+    unit = unit_of(text)
+    parts = text.removesuffix(unit).split(",")
     with suppress(ValueError):
-        tomllib.loads(f"value = {text}")
-        return [text]
-    parts = [part.strip() for part in text.split(",")]
-    if any(part.count(a) != part.count(b) for part in parts for a, b in ("[]", "{}")):
-        raise InputError("sweep --set", text, "must be values without commas within, which stand between them")
-    if (last_one := WITH_UNIT.fullmatch(parts[-1])) and not any(map(WITH_UNIT.fullmatch, parts[:-1])):
-        parts = [f"{part} {last_one[2]}" for part in [*parts[:-1], last_one[1]]]
-    return [_number(part) for part in parts]
-
-
-def _number(text: str) -> Any:
-    for kind in (int, float):
-        with suppress(ValueError):
-            return kind(text)
-    return text
+        first, last, number = parts[0].split(":")
+        parts = [f"{value:.12g}" for value in np.linspace(float(first), float(last), int(number))]
+    if unit:
+        return [f"{part.strip()} {unit}" for part in parts]
+    try:
+        found = tomllib.loads(f"values = [{','.join(parts)}]")["values"]
+    except tomllib.TOMLDecodeError:
+        return [part.strip() for part in parts]
+    return [text] if len(found) == 1 else [x if isinstance(x, str | int | float) else json.dumps(x) for x in found]
 
 
 def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], folder: Path) -> list[Point]:
@@ -104,7 +89,7 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
     for values in product(*keys.values()):
         changes = [f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in zip(keys, values, strict=True)]
         read = load_scene(scene, changes)
-        mesh = getattr(read.structure, "mesh", None)
+        mesh = read.structure.mesh_file
         content = "" if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
         text = json.dumps([read.to_dict(), content, " ".join(verb), __version__], sort_keys=True, default=str)
         name = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -114,8 +99,6 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
 
 def settle(point: Point, scene: Path, verb: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Any]:
     """Return the row of a point after the verb was run there in this process, alone, with what files register."""
-    import rotfem.commands.cli  # noqa: F401  the verbs
-
     for file in files:
         load(str(file), file, "sweep", "--load")
     changes = [part for change in point.changes for part in ("--set", change)]
@@ -182,48 +165,42 @@ def sweep(
         OutputError: a folder cannot be written.
     """
     scene, folder = Path(scene), Path(folder)
-    check_asked(keys, verb, jobs, comm)
-    points, problem = grid(scene, keys, verb, folder), None
+    check_asked(keys, verb)
+    points = grid(scene, keys, verb, folder)
     rows = {p.folder: p.row() for p in points if p.settled}
     swept = {key: list(values) for key, values in keys.items() if len(values) > 1}
-    fixed = {key: values[0] for key, values in keys.items() if key not in swept}
     of_all: dict[str, Any] = {"command": "sweep", "status": "done", "name": scene.stem, "verb": list(verb)}
-    of_all |= {"keys": swept, "fixed": fixed}
+    of_all |= {"keys": swept, "fixed": {key: values[0] for key, values in keys.items() if key not in swept}}
 
     def result() -> SweepResult:
-        those = [{k: v for k, v in rows[p.folder].items() if k not in fixed} for p in points if p.folder in rows]
-        reasons = [row["reason"] for row in those if row["status"] != "done"]
+        there = [
+            {k: v for k, v in rows[p.folder].items() if k not in of_all["fixed"]} for p in points if p.folder in rows
+        ]
+        reasons = [row["reason"] for row in there if row["status"] != "done"]
         warnings = [f"{len(reasons)} of {len(points)} points failed, the first one: {reasons[0]}"] if reasons else []
-        counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in those)}
-        return SweepResult({**of_all, **counts, "warnings": warnings, "versions": versions()}, those)
+        counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in there)}
+        return SweepResult({**of_all, **counts, "warnings": warnings, "versions": versions()}, there)
 
     with ResultFolder(comm, folder, "sweep", [scene]) as results:
         results.begin()
-        try:
-            for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
-                rows[point.folder] = row
+        for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
+            rows[point.folder] = row
+            with suppress(OutputError):  # which the last table raises on all ranks
                 write_text(folder / "sweep.csv", result().texts()["sweep.csv"])
-                if progress is not None:
-                    progress(len(rows) / len(points))
-        except OutputError as error:
-            problem = error
-        raise_first(comm.allgather(problem))
+            if progress is not None:
+                progress(len(rows) / len(points))
         found: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
         results.publish(found)
         return found
 
 
-def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str], jobs: int, comm: MPI.Comm) -> None:
+def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str]) -> None:
     """Refuse what cannot be swept, before anything is computed."""
-    import rotfem.commands.cli  # noqa: F401  the verbs
-
     if not verb or verb[0] not in VERBS:
         raise InputError("sweep", " ".join(verb), f"needs -- and a verb after it: {', '.join(VERBS)}")
     if max(map(len, keys.values()), default=0) < 2 or not all(keys.values()):
         several = "must give a key several values, KEY=first:last:number or KEY=a,b"
         raise InputError("sweep --set", " ".join(keys), several)
-    if jobs < 1 or (jobs > 1 and comm.size > 1):
-        raise InputError("sweep --jobs", jobs, "must be at least 1; under mpirun the ranks share the points")
     try:
         commands: Any = typer.main.get_command(app)
         commands.commands[verb[0]].make_context(verb[0], ["scene", *verb[1:]])

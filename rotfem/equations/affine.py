@@ -15,9 +15,8 @@ import numpy.typing as npt
 
 from rotfem.equations.clamp import ClampRows
 from rotfem.equations.modal_damping import EFFECT
-from rotfem.equations.model import Model
 from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
-from rotfem.equations.system import System
+from rotfem.equations.system import System, per_composition
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.motion import Motion
@@ -37,8 +36,8 @@ class AffineSystem(System):
     solved_at_once = True
     pieces: list[Piece]
 
-    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
-        super().__init__(model, moving, parted)
+    def __init__(self, *arguments: Any):
+        super().__init__(*arguments)
         if self._by_mode is not None:  # to those who project the pieces it is one like others
             taken_up = -self._by_mode.B @ self._by_mode.along(self.root.carried())  # by the hub, see `hub_damping`
             self.pieces = [*self.pieces, Piece("C", (), self._by_mode, frozenset((EFFECT, "")), taken_up)]
@@ -149,7 +148,7 @@ class AffineSystem(System):
         self.b.array[self.clamped] = 0.0
         return self.b
 
-    @cached_property
+    @per_composition
     def _at_clamp(self) -> ClampRows:
         return ClampRows(self.pieces, len(self.root.names))
 

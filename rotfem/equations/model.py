@@ -6,7 +6,8 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from itertools import combinations_with_replacement
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,7 @@ from rotfem.numerics import forms
 from rotfem.numerics.forms import added
 from rotfem.registry import resolved
 from rotfem.structures import build
-from rotfem.structures.structure import Structure
+from rotfem.structures.structure import Array, Structure
 from rotfem.users_functions import called
 
 #: Name ↦ constants of each integral of a form, and name ↦ compiled form.
@@ -82,13 +83,11 @@ class Model:
         residual: their sum F(q, v, a; δq), a UFL form.
         compositions: number of times they were written: once more at the first reference rotation.
         time: of the constants, s.
-        shown: time, view and effects left out of the constants; None for another motion than the problem's.
     """
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         self.problem, self.comm, self.theory = problem, comm, problem.theory
         self.time, self.compositions = 0.0, 1
-        self.shown: tuple[Any, ...] | None = None
         self.effects = problem.effective_effects()
         self.hub = HubAngle(problem.motion) if problem.motion.hub is not None else None
         self.motion: Motion = problem.motion if self.hub is None else self.hub.motion
@@ -186,8 +185,17 @@ class Model:
                 out[name] = self._switched(name, name in self.effects, term)
         return out
 
-    def derived_forms(self, purpose: str, make: Callable[[], dict[str, Any]], more: tuple[Any, ...] = ()) -> Both:
-        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes."""
+    def derived_forms(
+        self, purpose: str, make: Callable[[], dict[str, Any]], more: tuple[Any, ...] = (), once: bool = True
+    ) -> Both:
+        """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
+
+        Args:
+            purpose: what beside the residual they depend on.
+            make: name ↦ UFL form.
+            more: constants and functions in them that are not in the residual.
+            once: see `rotfem.numerics.forms.form`.
+        """
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
         functions = [*residual.coefficients(), *(x for x in more if isinstance(x, ufl.Coefficient))]
@@ -197,7 +205,7 @@ class Model:
             both = {name: known.on(self.structure.V, whole, data) for name, known in _KNOWN[key].items()}
             return {name: parts for name, (parts, _) in both.items()}, {name: form for name, (_, form) in both.items()}
         derived = make()
-        compiled = {name: forms.form(f, once=True) for name, f in derived.items()}
+        compiled = {name: forms.form(f, once) for name, f in derived.items()}
         known = {name: forms.mesh_free(f, compiled[name], whole) for name, f in derived.items()}
         if None not in known.values():
             _KNOWN[key] = known
@@ -298,3 +306,37 @@ class Model:
         here = self._stretch.eval(mesh, cells) if len(cells) else np.ones(1)
         least, largest = (self.comm.allreduce(float(f(here)), op) for f, op in ((np.min, MPI.MIN), (np.max, MPI.MAX)))
         return least, largest
+
+
+class RigidBody(NamedTuple):
+    """Integrals over the undeformed structure, frame axes.
+
+    Attributes:
+        mass: ∫ dm (kg).
+        first_moment: ∫ x dm about the origin of the frame (kg·m), (3,).
+        second_moment: ∫ x xᵀ dm about it, directors included (kg·m²), (3, 3).
+    """
+
+    mass: float
+    first_moment: Array
+    second_moment: Array
+
+    def about(self, point: Array) -> Array:
+        """Return the inertia tensor tr(E) 1 − E (kg·m²), (3, 3), about a point (m), of E = ∫ (x−p)(x−p)ᵀ dm."""
+        cross = np.outer(self.first_moment, point)
+        E = self.second_moment - cross - cross.T + self.mass * np.outer(point, point)
+        return np.asarray(np.trace(E) * np.eye(3) - E)
+
+
+def rigid_body(model: Model) -> RigidBody:
+    """Return the integrals of the undeformed structure of a model, with the mass of its effects."""
+    bodies = model.mechanics.bodies
+    places = [b for b in bodies if b.is_position]
+
+    parts = {"m": added(b.density * b.measure for b in places)}
+    parts |= {f"{i}": added(b.density * b.x[i] * b.measure for b in places) for i in range(3)}
+    pairs = list(combinations_with_replacement(range(3), 2))
+    parts |= {f"{i}{j}": added(b.density * b.x[i] * b.x[j] * b.measure for b in bodies) for i, j in pairs}
+    found = forms.Functionals(parts, model.structure.mesh)()
+    second = np.array([[found[f"{min(i, j)}{max(i, j)}"] for j in range(3)] for i in range(3)])
+    return RigidBody(found["m"], np.array([found[f"{i}"] for i in range(3)]), second)

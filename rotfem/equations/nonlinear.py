@@ -1,7 +1,26 @@
-"""The system of a nonlinear theory: residual and tangent are assembled at every state."""
+"""The system of a nonlinear theory: residual and tangent are assembled at every state, or over a whole step.
+
+A step from (q_0, v_0) to (q_1, v_1) is met at its middle, q = (q_0 + q_1)/2, q_1 − q_0 = h v, v_1 − v_0 = h a, by
+
+    F̄(q, v, a; δq) + λ Δq·N δq = 0,    Δq = q_1 − q_0,
+
+where F̄ is F with the mean of the stresses at both ends, ½ C (Γ(q_0) + Γ(q_1)), instead of those of the middle (Simo &
+Tarnow, Z. angew. Math. Phys. 43 (1992) 757): the middle of two rotated configurations is shorter than both, which would
+be a large force in a slender structure. With strains quadratic in q and constant inertia that conserves the energy. The
+remainder, of third order in Δq, is corrected by a discrete gradient (Gonzalez, J. Nonlinear Sci. 6 (1996) 449): with H
+the energy of the conservative terms F^c of F̄,
+
+    λ |Δq|²_N = H(q_1, v_1) − H(q_0, v_0) − F̄^c·Δq,
+
+so H changes by the work of all other terms and of the clamp on Δq alone. N is the mass matrix of the
+undeformed structure. H is the Jacobi integral for the spin, loads and base acceleration of the middle of the step. On a
+free hub, whose speed is an unknown, there is no such integral, and λ = 0.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -9,49 +28,17 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
-from dolfinx.fem import petsc as fem_petsc
-from ufl.algorithms import expand_derivatives
-from ufl.algorithms.analysis import extract_constants
 
-from rotfem.equations.clamp import ClampWork
-from rotfem.equations.energy_balance import EnergyBalance
-from rotfem.equations.system import System
+from rotfem.equations.clamp import ClampWork, TurningClamp
+from rotfem.equations.hub import BySpin
+from rotfem.equations.system import Instant, System, per_composition
+from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import Assembler, added, weighted
+from rotfem.numerics.forms import SAME_PATTERN, Assembler, assembled, weighted
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
-
-
-class BySpin:
-    """The column of a free hub's angle in the tangent: c_v ∂/∂Omega + c_m ∂/∂Omega' of a form.
-
-    The speed along the axis of the motion is varied.
-
-    Attributes:
-        ufl: the derivative, a UFL form; None if the speed is not in the form.
-    """
-
-    def __init__(self, model: Any, form: Any):
-        self._factors = [model.structure.constant(0.0) for _ in range(2)]
-        parts, expanded = [], expand_derivatives(form)
-        for name, factor in zip(("w", "dw"), self._factors, strict=True):
-            constant = model.frame.constants.get(name)
-            if constant is None:
-                continue
-            within = [part for part in expanded.integrals() if constant in extract_constants(part.integrand())]
-            s = ufl.variable(model.structure.constant(0.0))
-            axis = model.motion.axis[-constant.value.size :]
-            shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
-            derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
-            if not derivative.empty():
-                parts.append(factor * derivative)
-        self.ufl = added(parts) if parts else None
-
-    def set(self, c_v: float, c_m: float) -> None:
-        """Set the factors."""
-        for constant, value in zip(self._factors, (c_v, c_m), strict=True):
-            constant.value = value
 
 
 class PointStresses:
@@ -71,7 +58,7 @@ class PointStresses:
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
         self.mechanics = mechanics
         self._q, self._v, *_ = mechanics.k.functions
-        self._before, self._step = fem.Function(V), fem.Function(V)
+        self.functions = self._before, self._step = fem.Function(V), fem.Function(V)
         self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
 
     def come_from(self, before: Array) -> None:
@@ -113,83 +100,117 @@ class NonlinearSystem(System):
         signs: −1 of every local unknown, 0 where it is clamped.
     """
 
+    #: The equations over the step that is being solved; None for those at an instant.
+    _over: EnergyBalance | None = None
+
     def _compile(self) -> Assembler:
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._shift_entries = [constant.value for constant in self._shifts]  # where they are
-        self._spin: Any = None
         self.signs = np.full_like(self._b_array, -1.0)
         self.signs[self.clamped] = 0.0
-        if self.moving:
-            residuals = self.model.by_strains() if self.parted else [self._residual_form]
-            libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
-            if self.model.hub is not None and self._by_spin.ufl is not None:
-                libraries[-1].append(self._by_spin.ufl)
-            once = self.parted and self.structure.planar
-            compiled = [[forms.form(f, once) for f in library] for library in libraries]
-            self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
-            self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
+        if self.moving and self.parted:
+            parts, once = self.model.by_strains(), self.structure.planar
+            self._F = [forms.form(F, once) for F in parts]
+            self._J = [forms.form(self._tangent_of(F), once) for F in parts]
+            self._pattern = self._J[0]
+        elif self.moving:
+            made = self.model.derived_forms("moving", self._made_moving, tuple(self._shifts), once=False)[1]
+            self._F, self._J = [made["F"]], [made["J"]]
             self._pattern = self._J[0]
         else:
             self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
         return Assembler(self._pattern, self.bcs)
 
-    @cached_property
-    def _residual_form(self) -> Any:
-        return self.model.residual
+    def _made_moving(self) -> dict[str, Any]:
+        """Return F and its tangent as UFL forms."""
+        return {"F": self.model.residual, "J": self._tangent_form}
 
-    @cached_property
+    @per_composition
     def _tangent_form(self) -> Any:
-        return self._tangent_of(self._residual_form)
+        return self._tangent_of(self.model.residual)
 
     def _tangent_of(self, F: Any) -> Any:
         du = ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         return weighted(self._shifts, parts)
 
-    @cached_property
-    def balance(self) -> EnergyBalance:
-        """The equations over a whole step, with the balance of energy kept, compiled."""
+    # --- over a whole step -------------------------------------------------------------------------------------------
+
+    @per_composition
+    def _balance(self) -> EnergyBalance:
         return EnergyBalance(self)
 
-    @cached_property
+    @contextmanager
+    def over_step(self, start: Instant, end: float, memory: Any) -> Iterator[EnergyBalance]:
+        """Take the equations over a whole step (see `System`)."""
+        balance: EnergyBalance = self._balance
+        balance.begin(start, end, memory)
+        self._over = balance
+        try:
+            yield balance
+        finally:
+            self._over = None
+
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
+        """Write a state into the functions of the forms; over a step, whose middle it is, its end too."""
+        super().set_state(q, v, a)
+        if self._over is not None and v is not None and a is not None:
+            self._over.set_middle(q, v, a)
+
+    def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
+        """Write the motion of the clamp at time t (s); over a step so that it is exact at its end."""
+        if self._over is None or self.clamp is None:
+            super().prescribe(t, q, v, a)
+        else:
+            self._over.prescribe(self.clamp, q, v, a)
+
+    # --- forms -------------------------------------------------------------------------------------------------------
+
+    @per_composition
     def _stresses(self) -> PointStresses:
         return PointStresses(self.model.mechanics, self.V)
 
-    @cached_property
+    @per_composition
     def _on_the_way(self) -> Any:
-        """The tangent with these stresses, compiled; of a system that is not moving K alone at v = a = 0."""
+        """Return the tangent with these stresses, compiled; of a system that is not moving K alone at v = a = 0."""
+        purpose, more = f"on the way {self.model.theory.name}", (*self._stresses.functions, *self._shifts)
+        return self.model.derived_forms(purpose, self._made_on_the_way, more, once=not self.moving)[1]["K"]
+
+    def _made_on_the_way(self) -> dict[str, Any]:
+        """Return this tangent as a UFL form."""
         trial = ufl.TrialFunction(self.V)
         if self.moving:
             change = self._stresses.change(trial, self._shifts[1] / self._shifts[0])
-            return forms.form(self._tangent_form + self._shifts[0] * change)
-        change = self._stresses.change(trial)
-        return forms.form(self._at_rest["K"] + change, once=True)
+            return {"K": self._tangent_form + self._shifts[0] * change}
+        return {"K": self._at_rest["K"] + self._stresses.change(trial)}
 
-    @cached_property
+    @per_composition
     def _at_rest(self) -> dict[str, Any]:
-        return self.model.at_rest(self._residual_form)
+        return self.model.at_rest(self.model.residual)
 
     def _made(self) -> dict[str, Any]:
         return {name: form for name, form in self._at_rest.items() if not form.empty()}
 
-    @cached_property
+    @per_composition
     def _parts(self) -> dict[str, Any]:
         """F, K, C and M at v = a = 0, compiled, without those that vanish."""
         return self.model.derived_forms("at rest", self._made)[1]
 
     def residual(self) -> Any:
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+        if self._over is not None:
+            return self._over.residual()
         return self._negative(self._F, self.moving)
 
     def residual_in_motion(self) -> Any:
         """Return −F as `residual` does, of a system that is not moving with velocities and accelerations too."""
         return self._negative(self._F_in_motion, True)
 
-    @cached_property
+    @per_composition
     def _F_in_motion(self) -> list[Any]:
-        return self._F if self.moving else [forms.form(self._residual_form, once=True)]
+        return self._F if self.moving else [forms.form(self.model.residual, once=True)]
 
     def _negative(self, parts: list[Any], moving: bool) -> Any:
         b = self.sum_of(parts)
@@ -209,7 +230,7 @@ class NonlinearSystem(System):
             self._b.scatter_reverse(la.InsertMode.add)
         return b
 
-    @cached_property
+    @per_composition
     def _at_clamp(self) -> ClampWork:
         return ClampWork(self)
 
@@ -235,6 +256,8 @@ class NonlinearSystem(System):
         Of a system that is not moving one factor is 1, the others are 0. With the q before the last correction its
         geometric part has the stresses of `PointStresses`.
         """
+        if self._over is not None:
+            return self.with_modes(self._over.tangent((c_k, c_v, c_m), before, self.A), c_v), True
         if before is None or self.plain:
             parts = self._terms((c_k, c_v, c_m))
         else:
@@ -262,26 +285,190 @@ class NonlinearSystem(System):
         assert sorted(shifts) == [0.0, 0.0, 1.0]
         return [self._parts[name] for name, c in zip("KCM", shifts, strict=True) if c and name in self._parts]
 
-    @cached_property
+    @per_composition
     def _by_spin(self) -> BySpin:
-        return BySpin(self.model, self._residual_form)
+        return BySpin(self.model, self.model.residual)
+
+    @per_composition
+    def _spin(self) -> Any:
+        """Return the column of a free hub, compiled; None if the speed is not in F."""
+        by_spin, purpose = self._by_spin, f"spin {self.model.motion.axis}"
+
+        def make() -> dict[str, Any]:
+            return {} if by_spin.ufl is None else {"spin": by_spin.ufl}
+
+        return self.model.derived_forms(purpose, make, tuple(by_spin.constants), once=False)[1].get("spin")
 
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector (reused), zero at clamped unknowns."""
-        if self._by_spin.ufl is None:
+        if self._spin is None:
             self._spun.zeroEntries()
             return self._spun
-        self._spin = forms.form(self._by_spin.ufl) if self._spin is None else self._spin
         self._by_spin.set(c_v, c_m)
         return assembled(self._spin, self.V, self.clamped, self._spun)
 
 
-def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:
-    """Return a linear form as a PETSc vector (b if given, overwritten), zero at clamped unknowns."""
-    b = compat.create_vector(V) if b is None else b
-    with b.localForm() as local:
-        local.set(0.0)
-    fem_petsc.assemble_vector(b, form)
-    b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-    b.array[clamped] = 0.0
-    return b
+# --- over a whole step ------------------------------------------------------------------------------------------------
+
+
+class EnergyBalance:
+    """The equations of a nonlinear system over a step: their residual and tangent at the state of its functions.
+
+    Args:
+        system: the equations at an instant, whose functions hold the middle of the step.
+    """
+
+    def __init__(self, system: NonlinearSystem):
+        self.system, self.model, self.comm = system, system.model, system.model.comm
+        self._k = system.structure.k
+        *self._functions, self._test = self._k.functions
+        self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))
+        self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
+        more = (*self._shifts, self._start, self._end, self._before, self._ahead)
+        purpose = f"energy balance {self.model.theory.name}"
+        made = self.model.derived_forms(purpose, self._made, more, once=False)[1]
+        self._F, self._J = made["F"], made["J"]
+        self._inertia = compat.create_vector(system.V)
+        self._moved = compat.wrap(self._move.x)
+        self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
+        self._factor = self._due = 0.0
+
+    # --- forms -------------------------------------------------------------------------------------------------------
+
+    def _made(self) -> dict[str, Any]:
+        return {"F": self._residual, "J": self._tangent}
+
+    @cached_property
+    def _others(self) -> Any:
+        """All terms but that of the stresses."""
+        return sum(term for name, term in self.model.terms.items() if name != INTERNAL.name)
+
+    def _at(self, strain: Any, q: Any) -> Any:
+        return ufl.replace(strain.value, {self._functions[0]: q})
+
+    @property
+    def _residual(self) -> Any:
+        F = self._others
+        for s in self.model.mechanics.strains:
+            mean = (self._at(s, self._start) + self._at(s, self._end)) / 2
+            F += ufl.inner(s.force(mean), self._k.variation(s.value)) * s.measure
+        return F
+
+    @property
+    def _tangent(self) -> Any:
+        """The derivative, with stresses that are linear in the last correction (see `PointStresses`)."""
+        k, du = self._k, ufl.TrialFunction(self.system.V)
+        J = sum(c * ufl.derivative(self._others, x, du) for c, x in zip(self._shifts, self._functions, strict=True))
+        for s in self.model.mechanics.strains:
+            change = ufl.derivative(self._at(s, self._end), self._end, du)  # twice the half of it: q_1 = 2q − q_0
+            before = self._at(s, self._before)
+            end = before + ufl.derivative(before, self._before, self._ahead)
+            mean, varied = (self._at(s, self._start) + end) / 2, k.variation(s.value)
+            J += ufl.inner(s.force(change), varied) * s.measure
+            J += ufl.inner(s.force(mean), ufl.derivative(varied, self._functions[0], du)) * s.measure
+        return J
+
+    @cached_property
+    def _energy(self) -> Any:
+        return forms.form(self.model.energy())
+
+    @cached_property
+    def _work(self) -> Any:
+        """F of the terms without energy, on Δq; None if there are none."""
+        terms = self.model.terms_without_energy()
+        return forms.form(ufl.replace(sum(terms), {self._test: self._move})) if terms else None
+
+    @cached_property
+    def _N(self) -> Any:
+        System.set_state(self.system, self.system.zeros())
+        return self.system.matrix(0.0, 0.0, 1.0, 0.0)
+
+    # --- a step ------------------------------------------------------------------------------------------------------
+
+    def begin(self, start: Instant, end: float, memory: Any) -> None:
+        """Set start, end (s) and what the last one left (see `finish`) of a step; the time of its middle is set."""
+        n = len(self._start.x.array)
+        self._q_0, self._v_0, self._t_0, self._t_1 = start.q[:n], start.v[:n], start.t, end
+        self._start.x.array[:] = self._q_0
+        if self.model.hub is not None:
+            return
+        _ = self._N
+        energy, self._due = memory or (None, 0.0)
+        self._H_0 = self._H(self._q_0, self._v_0) if energy is None or not self.model.closed else energy
+
+    def finish(self) -> tuple[float, float] | None:
+        """Return the energy at the end of the solved step and the defect of its balance, for the next one (J)."""
+        if self.model.hub is not None:
+            return None
+        work = self._work_done()
+        H_1 = self._H(self._end.x.array, 2 * self._middle[1] - self._v_0)
+        return H_1, self._due + self._H_0 + work - H_1
+
+    def prescribe(self, clamp: TurningClamp, q: Array, v: Array, a: Array) -> None:
+        """Write the motion of the clamp so that it is exact at the end of the step."""
+        dofs, h = clamp.dofs, self._t_1 - self._t_0
+        start, end = self._q_0[dofs], clamp.at(self._t_1)[0]
+        q[dofs], v[dofs] = (start + end) / 2, (end - start) / h
+        a[dofs] = (v[dofs] - self._v_0[dofs]) * 2 / h
+
+    def set_middle(self, q: Array, v: Array, a: Array) -> None:
+        """Write the end of the step whose middle is in the functions of the forms."""
+        self._middle = q, v, a
+        self._end.x.array[:] = 2 * q - self._q_0
+        self._move.x.array[:] = 2 * (q - self._q_0)
+
+    def _H(self, q: Array, v: Array) -> float:
+        """Return the energy at a state, J; writes it."""
+        System.set_state(self.system, q, v)
+        return float(self.system.total(self._energy))
+
+    def _work_done(self) -> float:
+        """Return the work of the clamp and of the terms without energy over the step to the state set, J."""
+        work = -self.system.total(self._work)
+        if (part := self.system.by_mode) is not None:
+            force = part.times(self._middle[1][self._owned])
+            work -= self._product(force, self._move.x.array[self._owned], slice(None))
+        if self.system.clamp is not None:
+            work += self._product(self.system.sum_of([self._F]), self._move.x.array, self.system.clamped)
+        return float(work)
+
+    def _product(self, x: Array, y: Array, chosen: Any = None) -> float:
+        chosen = self._owned if chosen is None else chosen
+        return float(summed(self.comm, x[chosen] @ y[chosen]))
+
+    # --- solutions ---------------------------------------------------------------------------------------------------
+
+    def residual(self) -> Any:
+        """Return −(F̄ + λ N Δq) at the state set, zero at clamped unknowns."""
+        b = self.system.sum_of([self._F])
+        if self.model.hub is None:
+            self._balance(b)
+        if (part := self.system.by_mode) is not None:
+            b[self._owned] += part.times(self._middle[1][self._owned])
+        b *= self.system.signs
+        return self.system.b
+
+    def _balance(self, b: Array) -> None:
+        """Add λ N Δq to the assembled F̄."""
+        work = self._product(b, self._move.x.array) - self.system.total(self._work)
+        self._N.mult(self._moved, self._inertia)
+        size = self._product(self._inertia.array, self._move.x.array)
+        q, v, a = self._middle
+        H_1 = self._H(self._end.x.array, 2 * v - self._v_0)
+        System.set_state(self.system, q, v, a)
+        moved = size / (self._t_1 - self._t_0) ** 2
+        due = np.clip(self._due, -1e-3 * moved, 1e-3 * moved)  # what may be made up of what steps before have left
+        enough = moved > 1e-10 * max(abs(self._H_0), abs(H_1))  # in less the digits of H are lost
+        self._factor = (H_1 - self._H_0 - due - work) / size if enough else 0.0
+        b[self._owned] += self._factor * self._inertia.array
+
+    def tangent(self, shifts: tuple[float, float, float], before: Array | None, into: Any) -> Any:
+        """Return the tangent of the residual but for the change of λ, in a matrix; clamped rows are identity rows."""
+        for constant, value in zip(self._shifts, shifts, strict=True):
+            constant.value = value
+        self._before.x.array[:] = self._end.x.array if before is None else 2 * before - self._q_0
+        self._ahead.x.array[:] = self._end.x.array - self._before.x.array
+        self.system.assembler(self._J, diagonal=1.0, into=into)
+        if self._factor != 0.0:
+            into.axpy(self._factor, self._N, SAME_PATTERN)
+        return into

@@ -22,16 +22,14 @@ from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
-from rotfem.equations.clamp import AtClamp
+from rotfem.equations.clamp import AtClamp, RootReaction
 from rotfem.equations.model import Model
-from rotfem.equations.nonlinear import assembled
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import SAME_PATTERN, Assembler
+from rotfem.numerics.forms import SAME_PATTERN, Assembler, assembled
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
 from rotfem.numerics.projection import summed, with_ghosts
-from rotfem.structures.root_reaction import RootReaction
 
 
 def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, theory: Theory) -> Any:

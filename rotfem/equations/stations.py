@@ -65,9 +65,9 @@ class DampedStress:
 
     def compiled(self, expression: Callable[[], Any], points: Array) -> Any:
         """Return an expression, compiled at points of the cells; again after a change of the reference rotation."""
-        if self._compiled is None or self._compiled[0] != self._system.compilations:
+        if self._compiled is None or self._compiled[0] != self._system.compositions:
             made = forms.expression(expression(), points, self._system.comm)
-            self._compiled = self._system.compilations, made
+            self._compiled = self._system.compositions, made
         return self._compiled[1]
 
     def of(self, force: Any) -> Any:

@@ -1,48 +1,69 @@
 """The equations of motion F(q, v, a; δq) = 0 of a problem, and their tangents, compiled.
 
 F = Σ virtual work of inertia, effects, stress, damping and loads; M = ∂F/∂a, C = ∂F/∂v, K = ∂F/∂q by `ufl.derivative`.
-What all systems share is here; the nonlinear one is in `nonlinear`, that of the linear theories in `affine`, and one
-with the angle of a free hub as one more unknown in `bordered`.
+What all systems share is here: the state and the time of the forms, solutions with their matrices, readings. The
+nonlinear one is in `nonlinear`, that of the linear theories in `affine`; `compiled` adds the angle of a free hub.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection
-from functools import cached_property, lru_cache
-from typing import Any
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from time import perf_counter
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, la
 from mpi4py import MPI
+from petsc4py import PETSc
 
-from rotfem.equations.clamp import TurningClamp
-from rotfem.equations.functionals import Functionals
+from rotfem.equations.clamp import RootReaction, TurningClamp
+from rotfem.equations.hub import HubRow
 from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
-from rotfem.equations.solutions import Solutions
 from rotfem.errors import ComputationError
 from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import Assembler, added
-from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.forms import Assembler, Functionals, added
+from rotfem.numerics.linear import DirectSolver, SingularSolver, is_regular
 from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
-from rotfem.structures.root_reaction import RootReaction
+from rotfem.structures.reference_rotation import ReferenceRotation
 
 Array = npt.NDArray[np.float64]
 
 
-def forget(owner: Any) -> None:
-    """Delete the cached properties of an object."""
-    for name in list(vars(owner)):
-        if isinstance(getattr(type(owner), name, None), cached_property):
-            del vars(owner)[name]
+class Instant(Protocol):
+    """The motion at an instant: time (s), unknowns and rates, and what a free hub was given (see `System.hub_work`)."""
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    hub_work: Array | None
 
 
-class System(Solutions, ABC):
+T = TypeVar("T")
+
+
+class per_composition(Generic[T]):
+    """A property of a system that is made once, and anew with its forms (see `System.count_rotations_from`)."""
+
+    def __init__(self, make: Callable[[Any], T]):
+        self._make, self.__doc__ = make, make.__doc__
+
+    def __get__(self, system: System, kind: Any = None) -> T:
+        if self._make not in system.kept:
+            system.kept[self._make] = self._make(system)
+        found: T = system.kept[self._make]
+        return found
+
+
+class System(ABC):
     """A compiled system: residual and tangent at (q, v, a, t), and solutions with its tangent.
 
     Args:
@@ -50,6 +71,7 @@ class System(Solutions, ABC):
         moving: whether velocities and accelerations will be set, as in a history. A system that is not moving has
             forms of its own at v = a = 0, which compile in a fraction of the time.
         parted: see `rotfem.equations.compiled`.
+        view, signals: see below.
 
     Attributes:
         q, v, a: dolfinx functions that hold the state the forms are evaluated at.
@@ -59,8 +81,11 @@ class System(Solutions, ABC):
         scale: size of each local unknown (m or 1), by which increments are judged.
         clamp: motion of the clamp, where the frame does not rotate with it.
         root: rigid motions of what is clamped, which forces and moments at the root work on.
+        hub: what turns freely; None where the rotation is prescribed.
+        row: its equation; None likewise.
         signals: prescribed data that change with time.
         view: how they are evaluated (`rotfem.mechanics.time_signals`).
+        keeps_factor: whether a factor is kept over steps: where a factorisation takes much longer than a solution.
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
         plain: whether tangents are without `PointStresses`, which need a form of their own.
@@ -68,24 +93,29 @@ class System(Solutions, ABC):
         left_out: effects that are switched off.
         by_mode: the part of C by mode; None without, and where damping is left out.
         assembler: makes matrices of the pattern of all tangents.
-        compilations: of the forms: 1, or 2 after a change of the reference rotation.
+        compositions: of the model that the forms are of: 1, or 2 after a change of the reference rotation.
+        kept: what is made once for the forms, by what makes it.
     """
 
-    model: Model
     linear = False
     solved_at_once = False
     settled = False
     plain = False
     left_out: frozenset[str] = frozenset()
-    hub: Any = None
+    row: HubRow | None = None
     analysed: DirectSolver | None = None
-    signals: tuple[TimeSignal, ...] = ()
-    view: View
 
-    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
-        self.view, self.parted = View(), parted
+    def __init__(
+        self,
+        model: Model,
+        moving: bool = True,
+        parted: bool = False,
+        view: View | None = None,
+        signals: Collection[TimeSignal] = (),
+    ):
+        self.view, self.signals, self.parted = view or View(), tuple(signals), parted
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
-        self.comm, self.shared = model.comm, model.comm.size > 1
+        self.comm, self.shared, self.hub = model.comm, model.comm.size > 1, model.motion.hub
         self.q, self.v, self.a, _ = self.structure.k.functions
         self.V = self.structure.V
         #: Values of the frame's constants at the last few times, as iterations come back to them.
@@ -93,7 +123,6 @@ class System(Solutions, ABC):
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
         self.assembled = 0.0
-        self.compilations = 1
         self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.bcs, self.clamped = self.structure.clamp_conditions(), self.structure.clamped_unknowns()
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
@@ -101,15 +130,22 @@ class System(Solutions, ABC):
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)
-        self._solver: DirectSolver | None = None
         self.by_mode: ByMode | None = None
-        self.assembler = self._compile()
-        self.A = self.assembler.pattern
+        self._compose()
         self._by_mode = self.by_mode = damping_by_mode(self)
-        #: Whether a factor is kept over steps: where a factorisation takes much longer than a solution.
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
-    def count_rotations_from(self, reference: Any) -> None:
+    def _compose(self) -> None:
+        """Compile the forms of the model as it is now."""
+        self._solver: DirectSolver | None = None
+        self.kept = dict[Any, Any]()
+        self.assembler = self._compile()
+        self.A, self.compositions = self.assembler.pattern, self.model.compositions
+        if self.hub is not None:
+            self.row = HubRow(self.model, self.clamped, once=self.parted and self.structure.planar)
+            self.row.coupled &= "hub_coupling" not in self.left_out
+
+    def count_rotations_from(self, reference: ReferenceRotation | None) -> None:
         """Count rotations from a reference (`rotfem.structures.reference_rotation`), None for the undeformed structure.
 
         The first time all forms are compiled again, with the reference in them; `set_time` must follow.
@@ -126,15 +162,11 @@ class System(Solutions, ABC):
         if turns.use(reference):
             self.model.compose()
             self.model.compositions += 1
-        if reference is not None and self.compilations < self.model.compositions:
-            forget(self)
-            self.model.shown, self._solver = None, None
-            self.assembler = self._compile()
-            self.A = self.assembler.pattern
-            self.compilations = self.model.compositions
+        if reference is not None and self.compositions < self.model.compositions:
+            self._compose()
 
     @property
-    def reference(self) -> Any:
+    def reference(self) -> ReferenceRotation | None:
         """What rotations are counted from; None for the undeformed structure."""
         return None if self.structure.turns is None else self.structure.turns.reference
 
@@ -168,6 +200,9 @@ class System(Solutions, ABC):
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state: the speed along the axis varies; a PETSc vector."""
 
+    def check_terms(self) -> None:  # noqa: B027
+        """Refuse terms of a user that the equations cannot have."""
+
     @property
     def current(self) -> bool:
         """Whether M, C and K of the last tangent are those of this time; known of linear theories alone."""
@@ -179,7 +214,7 @@ class System(Solutions, ABC):
         self.model.switch_off(self.left_out)
         self.by_mode = None if EFFECT in effects else self._by_mode
 
-    @cached_property
+    @per_composition
     def _spun(self) -> Any:
         return compat.create_vector(self.V)
 
@@ -187,20 +222,10 @@ class System(Solutions, ABC):
         """Return A + c_v times the part of C that is damping by mode, of an A with c_v times all else in C."""
         return A if self.by_mode is None or c_v == 0.0 else PlusLowRank(A, self.by_mode, c_v)
 
-    @property
-    def balance(self) -> Any:
-        """The equations over a whole step, which keep the balance of energy; those of a linear theory are its own."""
-        return self
-
     # --- state -------------------------------------------------------------------------------------------------------
 
-    @property
-    def held(self) -> System:
-        """The system of the structure alone, with the hub fixed."""
-        return self
-
     def zeros(self) -> Array:
-        """Return unknowns that are all zero."""
+        """Return a local dof array of the structure that is zero."""
         return np.zeros_like(self.q.x.array)
 
     def start(self, q: Array) -> tuple[Array, Array]:
@@ -216,15 +241,23 @@ class System(Solutions, ABC):
         to_q, to_v, to_a = self._state
         to_q[:], to_v[:], to_a[:] = q, 0.0 if v is None else v, 0.0 if a is None else a
 
+    @contextmanager
+    def over_step(self, start: Instant, end: float, memory: Any) -> Iterator[Any]:
+        """Take the equations over a whole step from a start to an end (s), in place of those at an instant.
+
+        Yield what balances its energy (`rotfem.equations.nonlinear`); None of a linear theory, whose F does so itself.
+        """
+        yield None
+
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Write the frame and load constants of time t (s), for the problem's motion unless another is given.
 
         The load factor multiplies loads, gravity and base acceleration, not the spin.
         """
-        plain, motion = motion is None and load_factor == 1.0, motion or self.motion
-        self.model.time, self.model.shown = t, (t, self.view.side, self.view.line, self.left_out) if plain else None
+        own, motion = motion is None and load_factor == 1.0 and self.hub is None, motion or self.motion
+        self.model.time = t
         self.model.switch_off(self.left_out)
-        if plain and self.model.hub is None:
+        if own:
             values = self._frame_at(t, self.view.side, self.view.line, len(self.model.frame.constants))
         else:
             values = self.model.frame.values(motion, t)
@@ -235,11 +268,6 @@ class System(Solutions, ABC):
             for name, value in self.load_values(t, motion).items():
                 self.structure.load_constants[name].value[...] = load_factor * value
             self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
-
-    def show_time(self, t: float) -> None:
-        """Set the time t (s) unless it is set already, for the problem's motion and as it is at t itself."""
-        if self.model.shown != (t, 0, None, self.left_out):
-            self.set_time(t)
 
     def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
         """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""
@@ -261,6 +289,75 @@ class System(Solutions, ABC):
         if self.clamp is not None:
             dofs = self.clamp.dofs
             q[dofs], v[dofs], a[dofs] = self.clamp.at(t)
+
+    # --- solutions -------------------------------------------------------------------------------------------------
+
+    def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
+        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""
+        started = perf_counter()
+        b = self.residual()
+        A, changed = self.tangent(*shifts, before)
+        return self._timed(started, b, A, changed)
+
+    def chord(self) -> Array:
+        """Return the correction of q at the state with the present factor."""
+        started = perf_counter()
+        return self._timed(started, self.residual())
+
+    def _timed(self, started: float, b: Any, A: Any = None, changed: bool = False) -> Array:
+        """Return the solution of A x = b, of the factor at hand without A, and count the time of its two parts."""
+        assembled = perf_counter()
+        dq = self.local(self.factor(A, changed).solve(b))
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
+
+    def imbalance(self) -> Array:
+        """Return the owned part of −F at the state, a copy."""
+        return np.array(self.residual().array)
+
+    def factor(self, A: Any, changed: bool = True) -> DirectSolver:
+        """Return the solver of the system's tangent A, with a new factor where it has changed."""
+        if self._solver is None or changed:
+            self._solver = self._solver or DirectSolver(A)
+            self._solver.refresh(A)
+        return self._solver
+
+    @property
+    def factorisations(self) -> int:
+        """Number of matrix factorisations so far."""
+        return self._solver.factorisations if self._solver else 0
+
+    def acceleration(self) -> Array:
+        """Return the correction δa with which F = 0 at the state and time set: M δa = −F.
+
+        Unknowns without inertia (the rotation without rotary inertia) follow the others: K δa = 0 in their rows.
+        """
+        solver, massless = self.mass_solver()
+        b = self.residual()
+        b.array[massless] = 0.0
+        return self.local(solver.solve(b))
+
+    def mass_solver(self) -> tuple[DirectSolver | SingularSolver, Array]:
+        """Return a solver with M at the state, where it has to be completed with K, and unknowns without inertia.
+
+        A mass off the axis can leave a combination of rotations without inertia; then a multiple of K is added to M
+        that is negligible for all motions with inertia.
+        """
+        M = self.matrix(0.0, 0.0, 1.0, 1.0)
+        none = M.getDiagonal()
+        none.array[:] = none.array == 0.0
+        massless = np.asarray(none.array > 0.0)
+        if none.norm() > 0.0:
+            K = self.matrix(1.0, 0.0, 0.0, 1.0)
+            K.diagonalScale(none)
+            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        solver = DirectSolver(M)
+        if is_regular(M, solver):
+            return solver, massless
+        K = self.matrix(1.0, 0.0, 0.0, 1.0)
+        K.scale(1e-9 * M.norm() / K.norm())
+        return SingularSolver(M, K), massless
 
     # --- matrices --------------------------------------------------------------------------------------------------
 
@@ -288,8 +385,12 @@ class System(Solutions, ABC):
         """Return M, C, K with the angle of a free hub as last unknown; there is none here."""
         return matrices
 
-    def given(self, new: Any, old: Any = None) -> Array | None:
-        """Return work, impulse and moment at the end of a step; None without a free hub (see `BorderedSystem`)."""
+    def hub_work(self, new: Instant, old: Instant | None = None) -> Array | None:
+        """Return (work, impulse, moment) of a free hub at the end of a step, or at a first instant; None without one.
+
+        Work (J) of torque and brake and the angular impulse (N·m·s) of all forces from outside are since t = 0; the
+        moment (N·m) of these forces but torque and brake is kept for the next step.
+        """
         return None
 
     # --- readings of a state, the same on every process -----------------------------------------------------------
@@ -368,23 +469,28 @@ class System(Solutions, ABC):
             found = dict(zip(found, map(float, turned), strict=True))
         return found
 
+    def check_inside_out(self, time: float | None = None) -> None:
+        """Refuse a state that is set and turned inside out, which Newton's method may have led to."""
+        if not self.linear and self.model.inside_out():
+            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)", time=time)
+
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
         coordinates, q = self.structure.nodes(self.structure.total(self.q.x.array))
         q = self.seen_from_hub(q, coordinates["x"], self.time)
         return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
-    @cached_property
+    @per_composition
     def _energies(self) -> Functionals:
         return Functionals(self.model.energies(), self.structure.mesh)
 
-    @cached_property
+    @per_composition
     def _moment(self) -> Any:
-        """The sum of all applied moments, compiled; None without. Of planar beams, whose axis is that of the spin."""
+        """Return the sum of all applied moments, compiled; None without. Of planar beams, whose axis is the spin's."""
         moments = [load for load in self.model.mechanics.loads if is_moment(load.name)]
         return forms.form(added(load.force * load.measure for load in moments)) if moments else None
 
-    @cached_property
+    @per_composition
     def _outputs(self) -> dict[str, Any]:
         return {name: forms.form(form) for name, form in self.model.outputs().items()}
 

@@ -1,10 +1,10 @@
-"""The words every form is written in: bodies, strains, applied loads, and the unknown with its rates."""
+"""The words every form is written in: bodies, strains, springs, and the unknown with its rates."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import ufl
 
@@ -103,27 +103,6 @@ class Strain:
     def energy(self) -> Any:
         """∫ ½ Γ·C Γ, J."""
         return ufl.inner(self.force(self.value), self.value) / 2 * self.measure
-
-
-@dataclass(frozen=True)
-class AppliedLoad(Moved):
-    """A force (or moment) on a position (or angle) x(q).
-
-    Attributes:
-        name: name of its amplitude constant.
-        force: vector (or scalar), N, N/m or N·m.
-        x: what it works on, an expression of q.
-        measure: UFL measure.
-        dead: whether its direction does not depend on q.
-    """
-
-    name: str
-    force: Any
-    x: Any
-    measure: Any
-    dead: bool = True
-    #: Whether −force·x is a potential of it, where it is dead.
-    conservative: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)

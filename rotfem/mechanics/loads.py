@@ -7,14 +7,15 @@ place and time is evaluated at the nodes of the mesh (`PlaceLoad`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.mechanics.bodies import Moved
 from rotfem.mechanics.pitch import Pitch
 from rotfem.short import short_fields
 from rotfem.users_functions import checked
@@ -114,11 +115,6 @@ class Term:
         there = there if len(there) else np.arange(1)
         return cls.table(np.column_stack([t, amplitudes[:, there]]), Shapes(hats[there], x))
 
-    @classmethod
-    def harmonic(cls, shapes: Shapes, angle: Callable[[Array], Array], phase: float) -> Term:
-        """Return one shape with the amplitude cos(angle(t) + phase), in rad."""
-        return cls(shapes, lambda t: np.cos(angle(t) + phase)[:, None], linear=False, largest=np.ones(1), phase=phase)
-
     def at(self, t: Array) -> Array:
         """Return the amplitudes at times (n,), shape (n, k)."""
         return np.ones((len(t), len(self.shapes.values))) if self.amplitudes is None else self.amplitudes(t)
@@ -141,15 +137,10 @@ class Load:
         unpitched: the load in the frame of the hub, if this one is in that of a pitching blade.
     """
 
-    kind: str
-    terms: tuple[Term, ...]
+    kind: str = "dead"
+    terms: tuple[Term, ...] = ()
     seen: Callable[[float], Array] | None = None
     unpitched: Load | None = None
-
-    @classmethod
-    def of_components(cls, components: Sequence[float], kind: str = "dead") -> Load:
-        """Return a constant, uniform load of these components, N, N/m, N/m² or N·m."""
-        return cls(kind, (Term(Shapes.uniform([components])),))
 
     @cached_property
     def is_uniform(self) -> bool:
@@ -204,47 +195,34 @@ class Load:
         return np.sum(parts, axis=0) if len(parts) == len(self.terms) else None
 
 
-@dataclass(frozen=True)
-class PlaceLoad:
-    """A load that is a function of place and time, with the interface of `Load`.
+@dataclass(frozen=True, kw_only=True)
+class PlaceLoad(Load):
+    """A load that is a function of place and time, without terms; its components at places are its amplitudes.
 
     Attributes:
-        kind: see `Load`.
         function: (place, t) ↦ components (components,); place is x (m) along a beam, (x, y) on a plate.
         probes: places at which it is sampled to find its knots.
         constant: whether it does not change with time.
         knots: times (s) between which it is smooth, as far as they are known.
-        unpitched: see `Load`.
     """
 
-    kind: str
     function: Callable[[Any, float], Array]
     probes: tuple[Any, ...]
     constant: bool
     knots: tuple[float, ...] = ()
-    unpitched: PlaceLoad | None = None
     is_zero = is_uniform = linear = False
-    stations: tuple[float, ...] = ()
-    jumps: tuple[float, ...] = ()
 
     def on(self, places: tuple[Any, ...], t: float) -> Array:
         """Return the components at places, one after the other."""
         return np.concatenate([self.function(place, t) for place in places])
 
-    def at(self, t: float) -> Array:
-        """Return the components at the probes, one after the other."""
-        return self.on(self.probes, t)
-
     def many(self, t: Array) -> Array:
-        """Return the same at times (n,), shape (n, components)."""
-        return np.array([self.at(float(s)) for s in t])
+        """Return the components at the probes, one after the other, at times (n,), shape (n, components)."""
+        return np.array([self.on(self.probes, float(s)) for s in t])
 
     def sizes(self) -> None:
         """Return None: no bound is known."""
         return
-
-
-AnyLoad: TypeAlias = Load | PlaceLoad
 
 
 @dataclass(frozen=True)
@@ -258,7 +236,7 @@ class Loads:
     """
 
     gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    named: Mapping[str, AnyLoad] = field(default_factory=dict)
+    named: Mapping[str, Load] = field(default_factory=dict)
     places: tuple[tuple[float, ...], ...] = ()
     __repr__ = short_fields
 
@@ -278,7 +256,7 @@ class Loads:
         """Places along the structure (m) of jumps and point loads."""
         return {x for load in self.named.values() for x in load.jumps} | {p[0] for p in self.places if len(p) == 1}
 
-    def replaced(self, changed: Mapping[str, AnyLoad]) -> Loads:
+    def replaced(self, changed: Mapping[str, Load]) -> Loads:
         """Return the loads with some of them replaced, by name."""
         return replace(self, named={**self.named, **changed})
 
@@ -299,12 +277,10 @@ class Loads:
         return self.replaced({name: _in_blade(load, pitch) for name, load in dead.items()})
 
 
-def load_of(
-    key: str, given: Any, structure: Any, angle: Callable[[float], float] | None = None, kind: str = "dead"
-) -> AnyLoad:
+def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float], kind: str = "dead") -> Load:
     """Return one load, or another signal."""
     planar = structure.is_planar
-    size = 1 if key == "loads.pressure" or (planar and key.endswith("moment")) else 3
+    size = 1 if key == "loads.pressure" or (planar and is_moment(key)) else 3
     over, value = given.over
     if "x" in over and callable(value):
         timed = "t" in over
@@ -313,7 +289,7 @@ def load_of(
         # Places along the structure, of a plate from a file one, that show how the load changes with time.
         probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
         places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
-        return PlaceLoad(kind, at, places, constant=not timed)
+        return PlaceLoad(kind=kind, function=at, probes=places, constant=not timed)
     terms = [_harmonic(harmonic, angle) for harmonic in getattr(given, "harmonic", ())]
     if callable(value):
         of_time = checked(value, key, size, "time", planar)
@@ -330,12 +306,16 @@ def load_of(
     return Load(kind, tuple(terms))
 
 
-def _harmonic(harmonic: Any, angle: Any) -> Term:
-    amplitude, per_rev, omega = harmonic.amplitude, harmonic.per_rev, harmonic.frequency
+def _harmonic(given: Any, angle: Callable[[float], float]) -> Term:
+    """Return one shape with the amplitude cos(α(t) + phase), α = ω t or per_rev · ψ(t)."""
+    amplitude, rate = given.amplitude, given.frequency or given.per_rev or 0.0
     shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
-    if omega is not None:
-        return Term.harmonic(shapes, lambda t: omega * t, harmonic.phase)
-    return Term.harmonic(shapes, lambda t: per_rev * np.array([angle(float(s)) for s in t]), harmonic.phase)
+
+    def at(t: Array) -> Array:
+        turned = t if given.per_rev is None else np.array([angle(float(s)) for s in t])
+        return np.asarray(np.cos(rate * turned + given.phase)[:, None])
+
+    return Term(shapes, at, linear=False, largest=np.ones(1), phase=given.phase)
 
 
 def is_moment(name: str) -> bool:
@@ -343,7 +323,7 @@ def is_moment(name: str) -> bool:
     return name.endswith("moment")
 
 
-def _in_blade(load: AnyLoad, pitch: Pitch) -> AnyLoad:
+def _in_blade(load: Load, pitch: Pitch) -> Load:
     knots = tuple(sorted({*load.knots, *pitch.knots}))
     if isinstance(load, PlaceLoad):
         given = load.function
@@ -371,3 +351,27 @@ def _turned(term: Term, pitch: Pitch, knots: tuple[float, ...]) -> Iterator[Term
 
         largest = np.ones(len(shapes.values)) if term.amplitudes is None else term.largest
         yield Term(shapes, amplitudes, knots, linear=False, largest=largest)
+
+
+# --- in the forms -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class AppliedLoad(Moved):
+    """A force (or moment) on a position (or angle) x(q).
+
+    Attributes:
+        name: name of its amplitude constant.
+        force: vector (or scalar), N, N/m or N·m.
+        x: what it works on, an expression of q.
+        measure: UFL measure.
+        dead: whether its direction does not depend on q.
+    """
+
+    name: str
+    force: Any
+    x: Any
+    measure: Any
+    dead: bool = True
+    #: Whether −force·x is a potential of it, where it is dead.
+    conservative: ClassVar[bool] = True

@@ -30,7 +30,7 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 #: A quantity over time and its two rates.
-TimeSignal = tuple[Scalar, Scalar, Scalar]
+WithRates = tuple[Scalar, Scalar, Scalar]
 
 
 def turn_about(axis: Array, angle: float) -> Array:
@@ -135,12 +135,12 @@ class Pitch:
         return np.asarray((triples @ self.rotation(t).T).reshape(values.shape))
 
 
-def constant_pitch(angle: float) -> TimeSignal:
+def constant_pitch(angle: float) -> WithRates:
     """Return (θ, θ̇, θ̈) of an angle (rad) that stays."""
     return (lambda t: angle), (lambda t: 0.0), (lambda t: 0.0)
 
 
-def tabulated_pitch(rows: npt.ArrayLike) -> TimeSignal:
+def tabulated_pitch(rows: npt.ArrayLike) -> WithRates:
     """Return (θ, θ̇, θ̈) through rows (t in s, θ in rad): at rest at the first and the last, and before and after them.
 
     Piecewise cubics without overshoot, whose rate is continuous (Fritsch & Carlson, SIAM J. Numer. Anal. 17, 1980,
@@ -164,13 +164,13 @@ def tabulated_pitch(rows: npt.ArrayLike) -> TimeSignal:
     )
 
 
-def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> TimeSignal:
+def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> WithRates:
     """Return (θ, θ̇, θ̈) of a function of time: differences whose step follows it, not before t = 0."""
     first = rate or Derivative(angle, 1, cell, (0.0,))
     return angle, first, Derivative(angle, 2, cell, (0.0,)) if rate is None else Derivative(rate, 1, cell, (0.0,))
 
 
-def harmonic_pitch(amplitude: float, phase: float, turn: TimeSignal) -> TimeSignal:
+def harmonic_pitch(amplitude: float, phase: float, turn: WithRates) -> WithRates:
     """Return (θ, θ̇, θ̈) of amplitude · cos(α + phase), of an angle α(t) and its two rates."""
     alpha, rate, acceleration = turn
 

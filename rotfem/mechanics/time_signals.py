@@ -12,7 +12,7 @@ P_k those of Legendre: its best approximation in the sense of least squares, wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,9 +22,8 @@ import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss, legvander
 
 from rotfem.mechanics.free_hub import Torque
-from rotfem.mechanics.loads import AnyLoad, PlaceLoad
+from rotfem.mechanics.loads import Load, PlaceLoad
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.pitch import Pitch
 from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -75,6 +74,7 @@ class TimeSignal:
         many: the same of an array of times, shape (n, components); made of `at` if None.
         known: whether all knots are known; else jumps are searched.
         continuous: whether it must not jump, as speeds and angles.
+        view: how it is evaluated.
     """
 
     name: str
@@ -84,6 +84,7 @@ class TimeSignal:
     many: Callable[[Array], Array] | None = None
     known: bool = True
     continuous: bool = False
+    view: View = field(default_factory=View)
     _fit: tuple[Fit, Array] | None = None
 
     def values(self, t: Array) -> Array:
@@ -110,16 +111,12 @@ class TimeSignal:
         largest = float(np.linalg.norm(f, axis=1).max())
         return np.asarray(np.linalg.norm(f - self.fitted(t, begin, end, degree), axis=1) / (largest or 1.0))
 
-    def seen(self, view: View) -> Callable[[float], Any]:
-        """Return the signal as a function of time, evaluated as a view says."""
-
-        def at(t: float) -> Any:
-            if view.line is not None:
-                value = self.fitted(np.array([t]), *view.line)[0]
-                return float(value[0]) if np.ndim(self.at(t)) == 0 else value
-            return self.at(t + view.side * SAME * (abs(t) or SAME)) if view.side else self.at(t)
-
-        return at
+    def seen(self, t: float) -> Any:
+        """Return the value at a time (s), evaluated as the view says."""
+        if self.view.line is not None:
+            value = self.fitted(np.array([t]), *self.view.line)[0]
+            return float(value[0]) if np.ndim(self.at(t)) == 0 else value
+        return self.at(t + self.view.side * SAME * (abs(t) or SAME)) if self.view.side else self.at(t)
 
 
 @dataclass(frozen=True)
@@ -137,65 +134,53 @@ def viewed(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
     """Return the problem with signals that are evaluated as a view says, and those that change with time."""
     signals: list[TimeSignal] = []
 
-    def see(signal: TimeSignal) -> Callable[[float], Any]:
-        signals.append(signal)
-        return signal.seen(view)
+    def see(name: str, at: Callable[[float], Any], knots: Any, **more: Any) -> TimeSignal:
+        signals.append(TimeSignal(name, at, np.array(() if knots is None else knots, dtype=float), view=view, **more))
+        return signals[-1]
 
     motion = _viewed_motion(problem.motion, see)
     changing = {name: load for name, load in problem.loads.named.items() if not load.constant}
-    seen = {name: _viewed_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
+    seen = {name: _viewed_load(f"loads.{name}", load, see) for name, load in changing.items()}
     return problem.replace(motion=motion, loads=problem.loads.replaced(seen)), signals
 
 
-def _viewed_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:
+def _viewed_load(name: str, load: Load, see: Callable[..., TimeSignal]) -> Load:
     """Return a load, evaluated as a view says; a function of place with the knots found at its probes."""
-    signal = TimeSignal(name, load.at, _times(load.knots), many=load.many, known=load.linear)
-    sampled = see(signal)
+    signal = see(name, load.at, load.knots, many=load.many, known=load.linear)
     if not isinstance(load, PlaceLoad):
-        return replace(load, seen=sampled)
+        return replace(load, seen=signal.seen)
     function = load.function
 
     def at(place: Any, t: float) -> Array:
-        one = TimeSignal(name, lambda s: function(place, s), signal.knots)
-        return np.asarray(one.seen(view)(t))
+        return np.asarray(TimeSignal(name, lambda s: function(place, s), signal.knots, view=signal.view).seen(t))
 
     return replace(load, function=at)
 
 
-def _viewed_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Motion:
+def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
+    """Return a motion, evaluated as a view says; speed, pitch and its rate must not jump."""
     changes: dict[str, Any] = {}
     if motion.is_accelerated and not motion.constant:
         base, at = motion.base_knots, motion.base_acceleration
-        signal = TimeSignal("motion.base_acceleration", at, _times(base), many=_between(at, base))
-        signal.known = base is not None
-        changes["base_acceleration"] = see(signal)
+        changes["base_acceleration"] = see(
+            "motion.base_acceleration", at, base, many=_between(at, base), known=base is not None
+        ).seen
     if motion.hub is not None:
         if len((torque := motion.hub.torque).knots):
-            signal = TimeSignal("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
-            changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, see(signal)))
+            signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
+            changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:
-        known = motion.smooth or motion.breakpoints is not None
+        more = {"smooth": np.array(motion.knots), "known": motion.smooth or motion.breakpoints is not None}
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
-            signal = TimeSignal(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
-            signal.continuous = name == "speed"
-            changes[name] = see(signal)
-    if motion.pitch is not None:
-        changes["pitch"] = _viewed_pitch(motion.pitch, see)
+            signal = see(f"motion.{name}", f, motion.sharp, many=many, continuous=name == "speed", **more)
+            changes[name] = signal.seen
+    if (pitch := motion.pitch) is not None:
+        turned = dict[str, Any]()
+        for name, (key, f) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):
+            turned[name] = see(key, f, pitch.knots, known=pitch.known, continuous=name != "acceleration").seen
+        changes["pitch"] = replace(pitch, **turned)
     return replace(motion, **changes)
-
-
-def _viewed_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Pitch:
-    """Return a pitch, evaluated as a view says; neither the angle nor its rate may jump."""
-    changes = dict[str, Any]()
-    for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):
-        signal = TimeSignal(key, at, _times(pitch.knots), known=pitch.known, continuous=name != "acceleration")
-        changes[name] = see(signal)
-    return replace(pitch, **changes)
-
-
-def _times(knots: Iterable[float] | None) -> Array:
-    return np.array(() if knots is None else knots, dtype=float)
 
 
 def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:

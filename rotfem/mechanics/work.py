@@ -24,7 +24,8 @@ import ufl
 from dolfinx import default_scalar_type, fem, mesh
 from ufl import cross
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Moved, RootSpring, Strain
+from rotfem.mechanics.bodies import Body, Damping, Kinematics, Moved, RootSpring, Strain
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added

@@ -28,15 +28,15 @@ def wrap(x: la.Vector) -> Any:
     return dolfinx.la.petsc.create_vector_wrap(x)
 
 
-def form_of(code: Any, module: Any, spaces: list[Any], functions: list[Any], constants: list[Any], data: Any) -> Any:
-    """Return a form of code that FFCx has compiled, on the mesh of its spaces (0.9 wants a pointer, 0.11 a list)."""
+def form_of(code: Any, module: Any, V: Any, functions: list[Any], constants: list[Any], data: Any) -> Any:
+    """Return a form of code that FFCx has compiled, on the mesh of a space (0.9 wants a pointer, 0.11 a list)."""
     regions = {}
     for kind in (getattr(fem.IntegralType, name) for name in data):
         begin, end = (code.form_integral_offsets[kind.value + i] for i in (0, 1))
         ids = {code.form_integral_ids[i] for i in range(begin, end)} - {-1}  # -1 is everywhere
         regions[kind] = fem.forms.get_integration_domains(kind, data[kind.name][0], sorted(ids))
-    objects = [[x._cpp_object for x in each] for each in (spaces, functions, constants)]
-    make, mesh = fem.forms.form_cpp_class(PETSc.ScalarType), spaces[0].mesh.ufl_domain().ufl_cargo()
+    objects = [[x._cpp_object for x in each] for each in ([V] * code.rank, functions, constants)]
+    make, mesh = fem.forms.form_cpp_class(PETSc.ScalarType), V.mesh.ufl_domain().ufl_cargo()
     pointer = int(module.ffi.cast("uintptr_t", module.ffi.addressof(code)))
     try:
         made = make([pointer], *objects, regions, [], mesh)

@@ -28,8 +28,17 @@ from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
-from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
+from rotfem.numerics.linear import (
+    ROUNDED,
+    SMALL,
+    DirectSolver,
+    balanced,
+    least_frequency,
+    power_of_two,
+    transposed,
+    unknown_scale,
+    use_direct_solver,
+)
 from rotfem.numerics.projection import Sendable, sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
@@ -204,6 +213,15 @@ class Eigenpairs:
         """Return these pairs and others behind them."""
         names = ("values", "right", "left", "errors", "bounds")
         return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
+
+
+def backward_errors(pencil: Pencil, values: Array, X: Array) -> Array:
+    """Return the normwise backward errors of eigenpairs, ‖(λ² M + λ C + K) x‖ / [(|λ|² ‖M‖ + |λ| ‖C‖ + ‖K‖) ‖x‖]."""
+    matrices, powers = (pencil.M, pencil.C, pencil.K), np.array([values**2, values, np.ones_like(values)])
+    residual = sum(power * pencil.apply(A, X) for A, power in zip(matrices, powers, strict=True))
+    norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in matrices])
+    squares = summed(pencil.comm, np.array([np.sum(np.abs(Y) ** 2, axis=0) for Y in (residual, X)]))
+    return np.asarray(np.sqrt(squares[0] / squares[1]) / (norms @ np.abs(powers)))
 
 
 def basis_of(wanted: int, unknowns: int) -> int:

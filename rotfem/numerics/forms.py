@@ -10,7 +10,9 @@ import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
+from basix.ufl import element
 from dolfinx import cpp, fem, la
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives, extract_coefficients
@@ -132,6 +134,17 @@ def add_vector(b: npt.NDArray[np.float64], form: Any) -> None:
     cpp.fem.assemble_vector(b, code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code))
 
 
+def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:
+    """Return a linear form as a PETSc vector (b if given, overwritten), zero at clamped unknowns."""
+    b = compat.create_vector(V) if b is None else b
+    with b.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(b, form)
+    b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+    b.array[clamped] = 0.0
+    return b
+
+
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or
 #: on a few cells. -O2 makes code for lines quicker by a tenth. That for surfaces is long: -O2 takes twice as long over
 #: it as -O1, and makes it no quicker up to degree 3, at degree 4 by a seventh; -O0 makes it three times slower.
@@ -168,20 +181,18 @@ class MeshFree(NamedTuple):
         code: FFCx's form, and its module.
         coefficients, constants: their places among those of a whole.
         parts: places of the constants of each integral.
-        rank: number of arguments.
     """
 
     code: tuple[Any, Any]
     coefficients: list[int]
     constants: list[int]
     parts: list[list[int]]
-    rank: int
 
     def on(self, V: fem.FunctionSpace, whole: tuple[Sequence[Any], Sequence[Any]], regions: Any) -> tuple[Any, Any]:
         """Return (constants of each integral, compiled form) on the mesh of a space of the arguments."""
         coefficients = [whole[0][i] for i in self.coefficients]
         constants = [whole[1][i] for i in self.constants]
-        made = compat.form_of(*self.code, [V] * self.rank, coefficients, constants, regions)
+        made = compat.form_of(*self.code, V, coefficients, constants, regions)
         return [[whole[1][i] for i in part] for part in self.parts], made
 
 
@@ -193,7 +204,7 @@ def mesh_free(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]])
         return None
     places, parts = {c: i for i, c in enumerate(constants)}, constants_of(f)
     own = [places[c] for c in f.constants()], [[places[c] for c in part] for part in parts]
-    return MeshFree((code, compiled.module), [coefficients.index(x) for x in used], *own, len(f.arguments()))
+    return MeshFree((code, compiled.module), [coefficients.index(x) for x in used], *own)
 
 
 def constants_of(f: Any) -> list[list[Any]]:
@@ -294,3 +305,37 @@ def added(parts: Iterable[Any]) -> Any:
 def weighted(factors: Iterable[Any], parts: Iterable[Any]) -> ufl.Form:
     """Return the sum of UFL forms, each times a scalar."""
     return ufl.Form([c * integral for c, form in zip(factors, parts, strict=True) for integral in form.integrals()])
+
+
+class Functionals:
+    """Values of functionals, name ↦ UFL form, compiled as one form with a constant in every cell for each of them.
+
+    Common subexpressions are computed once.
+    """
+
+    def __init__(self, parts: dict[str, Any], mesh: Any):
+        self.names, self.comm = tuple(parts), mesh.comm
+        if not parts:
+            return
+        constant = element("DG", mesh.basix_cell(), 0, shape=(len(parts),))
+        self._V = fem.functionspace(mesh, constant)  # which must outlast its array
+        which = ufl.TestFunction(self._V)
+        integrals = [
+            integral.reconstruct(which[i] * integral.integrand())
+            for i, part in enumerate(parts.values())
+            for integral in part.integrals()
+        ]
+        self._form = form(ufl.Form(integrals))
+        cells = self._V.dofmap.index_map
+        self._of_cells = np.zeros((cells.size_local + cells.num_ghosts, len(parts)))
+
+    def __call__(self) -> dict[str, float]:
+        """Return their values over all ranks, at what their forms are evaluated at."""
+        if not self.names:
+            return {}
+        self._of_cells.fill(0.0)
+        add_vector(self._of_cells.reshape(-1), self._form)
+        values = self._of_cells.sum(axis=0)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values, op=MPI.SUM)
+        return dict(zip(self.names, values.tolist(), strict=True))

@@ -15,9 +15,8 @@ from rotfem.scene.blades.deck import Asked, keys_of
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Hinge, Root, SpatialRoot, SupportTable
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
-from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
+from rotfem.scene.structure import DampingTable, Hinge, Root, SpatialRoot, StructureTable, SupportTable, check_one_hub
 from rotfem.scene.table import BY_SHAPE, SceneModel, along, empty, in_units, one_of, problem, problems_at, unit
 from rotfem.scene.values import (
     DIGITS,

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,28 +17,8 @@ from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
 from rotfem.units import is_quantity
 
-#: Files that a scene which is being read consists of; None where they are not recorded.
-_read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
-
-
-@contextmanager
-def noted_files() -> Iterator[list[Path]]:
-    """Give a list that the paths of all files are in which are read in the meantime."""
-    files, before = list[Path](), _read.get()
-    token = _read.set(files)
-    try:
-        yield files
-    finally:
-        _read.reset(token)
-        if before is not None:
-            before += files
-
-
-def note(path: Path) -> None:
-    """Take note of a file that is read."""
-    files = _read.get()
-    if files is not None:
-        files.append(path.absolute())
+#: Files that have been read, in order; those that a scene consists of are the ones since its reading began.
+READ: list[Path] = []
 
 
 class Unreadable(Exception):
@@ -49,7 +27,7 @@ class Unreadable(Exception):
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file."""
-    note(path)
+    READ.append(path.absolute())
     try:
         return path.read_bytes()
     except FileNotFoundError:
@@ -60,19 +38,23 @@ def read_bytes(path: Path) -> bytes:
         raise Unreadable(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
 
 
+def read_text(path: Path) -> str:
+    """Return the content of a text file in UTF-8."""
+    try:
+        return read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Unreadable(f"cannot be read: byte {error.start} is not UTF-8 text") from None
+
+
 _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file."""
     try:
-        return tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        return tomllib.loads(read_text(path))
     except Unreadable as error:
         reason = str(error)
-    except UnicodeDecodeError as error:
-        reason = f"not valid TOML: byte {error.start} is not UTF-8 text"
-    except RecursionError:
-        reason = "not valid TOML: tables or lists are nested too deep"
     except ValueError as error:  # a slip, or an integer of thousands of digits
         reason = f"not valid TOML: {printable(str(error))}"
     raise SceneError(str(path), allowed=reason) from None
@@ -88,7 +70,7 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
         raise SceneError(file, allowed=f"override {show(override)} must have the form table.key=value")
     try:
         parsed = tomllib.loads(f"value = {text}")
-    except (ValueError, RecursionError):  # a syntax error, or a number or nesting beyond what Python reads
+    except ValueError:  # a syntax error, or a number beyond what Python reads
         return key, text
     # More than one key means that the text holds a line break: no single TOML value.
     return key, parsed["value"] if set(parsed) == {"value"} else text
@@ -154,7 +136,7 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not found:
         what = "is no regular file" if there else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
-    note(path)
+    READ.append(path)
     return path
 
 
@@ -185,11 +167,9 @@ def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
         return problem("", str(path), reason)
 
     try:
-        text = read_bytes(path).decode("utf-8-sig")
+        text = read_text(path)
     except Unreadable as error:
         raise refused(str(error)) from None
-    except UnicodeDecodeError as error:
-        raise refused(f"cannot be read: byte {error.start} is not UTF-8 text") from None
     header, rows, width, top = list[str](), list[tuple[float, ...]](), 0, 0  # columns of the first row, and its line
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if not (cells := _cells(line)):

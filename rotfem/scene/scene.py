@@ -18,7 +18,7 @@ from rotfem import registry
 from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.files import apply_overrides, noted_files, read_toml, set_keys, to_builtin
+from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
 from rotfem.scene.loads import LoadsTable, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
@@ -130,12 +130,8 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
-        try:
-            tables = to_builtin(data)
-        except RecursionError:
-            raise SceneError(file, allowed="tables or lists are nested too deep") from None
-        with noted_files() as extensions:
-            load_wanted(tables, file, directory)
+        tables, before = to_builtin(data), len(READ)
+        load_wanted(tables, file, directory)
         given = tables.get("motion")
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
@@ -143,12 +139,11 @@ class Scene(SceneModel):
         kind = structure.get("type") if isinstance(structure, Mapping) else None
         context = {"directory": directory, "accuracy": whole.get("accuracy"), "type": kind}
         try:
-            with noted_files() as files:
-                scene = cls.model_validate(whole, context={**context, "hints": hints})
+            scene = cls.model_validate(whole, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
-        scene._inputs = (*extensions, *files)
+        scene._inputs = tuple(dict.fromkeys(READ[before:]))
         return scene
 
     def __repr__(self) -> str:
@@ -225,16 +220,31 @@ class Scene(SceneModel):
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
 
     def _check(self) -> None:
-        check_together(self)
+        """Refuse tables that cannot be combined, the most basic of them first."""
+        structure, motion, model = self.structure, self.motion, self.model
+        if structure.is_planar:
+            check_planar(motion, self.loads)
+        if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
+            raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
+        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_mesh(structure, self.mesh)
+        check_theory(structure, model)
+        check_frame(structure, motion, model)
+        check_initial(structure, motion, model, self.initial)
+        if self.accuracy is None and self.accuracy_budget is not None:
+            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
+        if self.accuracy is not None and not self.output.error:
+            why = "cannot be combined with accuracy, which is met by what is estimated"
+            raise problem("output.error", False, why)
+        self.output.check(structure.type, structure.length)
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     """Return the validated scene of a TOML file."""
     path = Path(path)
-    with noted_files() as files:
-        tables = apply_overrides(path.name, read_toml(path), overrides)
-        scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
-    scene._inputs = tuple(files)
+    tables = apply_overrides(path.name, read_toml(path), overrides)
+    scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene._inputs = (path.absolute(), *scene._inputs)
     return scene
 
 
@@ -273,22 +283,6 @@ def plain(value: Any) -> Any:
 
 
 # --- what tables say together: each check raises a problem that names the key to change ------------------------------
-
-
-def check_together(scene: Scene) -> None:
-    """Refuse tables of a scene that cannot be combined, the most basic of them first."""
-    structure, motion, model = scene.structure, scene.motion, scene.model
-    if structure.is_planar:
-        check_planar(motion, scene.loads)
-    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
-        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
-    check_loads(structure, motion.is_free, scene.loads, scene.time is not None)
-    check_mesh(structure, scene.mesh)
-    check_theory(structure, model)
-    check_frame(structure, motion, model)
-    check_initial(structure, motion, model, scene.initial)
-    check_accuracy(scene)
-    scene.output.check(structure.type, structure.length)
 
 
 def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
@@ -398,14 +392,3 @@ def _check_velocity(structure: Any, rows: Matrix) -> None:
         why = "the third component must be 0 for a planar_beam"
     if why is not None:
         raise problem("initial.velocity", None, why)
-
-
-def check_accuracy(scene: Scene) -> None:
-    """Refuse what an accuracy excludes, and a budget without one."""
-    if scene.accuracy is None:
-        if scene.accuracy_budget is not None:
-            reason = "is what an accuracy may take, and needs accuracy"
-            raise problem("accuracy_budget", scene.accuracy_budget, reason)
-        return
-    if not scene.output.error:
-        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")

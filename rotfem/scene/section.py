@@ -10,7 +10,7 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Annotated, Any, ClassVar
 
@@ -67,31 +67,26 @@ OverSpan = Annotated[
 ]
 
 
-def _points(value: Any) -> Any:
-    """Return rows [x, y, z] as [x, [y, z]]."""
-    return _split(value, {3: lambda point: point})
+def _nested(value: Any) -> Any:
+    """Return rows of x and the entries of a point, or of a matrix, as [x, point or matrix].
 
-
-def _matrices(value: Any) -> Any:
-    """Return rows of x and the 36 entries of a matrix row by row, or the 21 of its upper triangle, as [x, matrix]."""
-    return _split(value, {37: _matrix, 22: _matrix})
-
-
-def _split(value: Any, ways: Mapping[int, Callable[[Any], Any]]) -> Any:
+    A matrix has 36 entries row by row, or the 21 of its upper triangle.
+    """
     if not isinstance(value, list | tuple):
         return value
-    rows = [row if isinstance(row, list | tuple) else () for row in value]
-    return [(row[0], ways[len(row)](row[1:])) if len(row) in ways else value[i] for i, row in enumerate(rows)]
+    return [_row(row) if isinstance(row, list | tuple) and len(row) in (3, 22, 37) else row for row in value]
 
 
-def _matrix(entries: Sequence[Any]) -> list[list[Any]]:
-    """Return a matrix (6, 6) of its 36 entries, or of the 21 of its upper triangle."""
+def _row(row: Sequence[Any]) -> list[Any]:
+    x, *entries = row
+    if len(entries) == 2:
+        return [x, entries]
     at = np.arange(36).reshape(6, 6) if len(entries) == 36 else symmetric_matrices(np.arange(21)).astype(int)
-    return [[entries[i] for i in row] for row in at]
+    return [x, [[entries[i] for i in places] for places in at]]
 
 
-Center = Annotated[OverSpan[Point], unit("m"), BeforeValidator(_points), FROM_FILE]
-Matrices = Annotated[OverSpan[Rows], BeforeValidator(_matrices), FROM_FILE]
+Center = Annotated[OverSpan[Point], unit("m"), BeforeValidator(_nested), FROM_FILE]
+Matrices = Annotated[OverSpan[Rows], BeforeValidator(_nested), FROM_FILE]
 
 
 # --- what planar and spatial beams share ------------------------------------------------------------------------------
@@ -336,9 +331,7 @@ class SpatialSection(Section):
         second_moment2: ∫z² dA (m⁴).
         second_moment3: ∫y² dA (m⁴).
         torsion_constant: Saint-Venant's J (m⁴).
-        mass_center: position (y, z) in the section (m), or a table of them.
-        shear_center: position (y, z) in the section (m), or a table of them.
-        tension_center: position (y, z) in the section (m), or a table of them.
+        mass_center, shear_center, tension_center: position (y, z) in the section (m), or a table of them.
         polar_radius: radius of gyration of the axial stiffness about the shear center, (∫Er² dA/∫E dA)^½ (m); if not
             given, from EA, EI2, EI3 and the centers. It is for the effect `trapeze`.
         principal_angle: angle (rad) about axis 1 from the section axes to those that GA2, GA3, EI2, EI3 and the rotary

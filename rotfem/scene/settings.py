@@ -73,11 +73,9 @@ class ModelTable(SceneModel):
 
 def _padded(rows: Any) -> Any:
     """Return rows (x, v1, v2, v3) of rows that may leave v3 out."""
-    return [(*row, 0.0)[:4] if len(row) in (3, 4) else row for row in rows] if _is_rows(rows) else rows
-
-
-def _is_rows(value: Any) -> bool:
-    return isinstance(value, list | tuple) and all(isinstance(row, list | tuple) for row in value)
+    if not isinstance(rows, list | tuple):
+        return rows
+    return [(*row, 0.0) if isinstance(row, list | tuple) and len(row) == 3 else row for row in rows]
 
 
 Velocities = Annotated[
@@ -326,17 +324,12 @@ class Solver(SceneModel):
         max_iterations: most Newton iterations per solve.
     """
 
+    GONE: ClassVar[Mapping[str, str]] = {
+        "continuation": "paths past limit points went with version 0.9: leave it out, the load is raised in steps"
+    }
+
     increment_tolerance: Positive = 1e-9
     max_iterations: Count = 25
-
-    @classmethod
-    def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
-        if "continuation" in data:
-            why = (
-                "unknown key; paths past limit points went with version 0.9: leave it out, the load is raised in steps"
-            )
-            raise problem("continuation", None, why)
-        return data
 
 
 def _as_quantities(value: Any) -> tuple[str, ...]:

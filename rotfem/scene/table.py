@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -51,6 +51,11 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
     """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f'did you mean "{matches[0]}"? ' if matches else ""
+
+
+def unknown_key(key: object, names: Collection[str]) -> str:
+    """Return what is allowed in the place of a key that a table does not have."""
+    return f"unknown key; {did_you_mean(key, names)}allowed: {', '.join(names)}"
 
 
 def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
@@ -170,8 +175,8 @@ class SceneModel(BaseModel):
         data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
-                instead = cls.GONE.get(key) or f"{did_you_mean(key, names)}allowed: {', '.join(names)}"
-                raise problem(str(key), None, f"unknown key; {instead}")
+                gone = cls.GONE.get(key)
+                raise problem(str(key), None, f"unknown key; {gone}" if gone else unknown_key(key, names))
         return data
 
     @model_validator(mode="after")

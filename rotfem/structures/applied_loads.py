@@ -15,8 +15,8 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
-from rotfem.mechanics.bodies import AppliedLoad, Kinematics
-from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, Shapes, is_moment
+from rotfem.mechanics.bodies import Kinematics
+from rotfem.mechanics.loads import AppliedLoad, Load, PlaceLoad, Shapes, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.points import Points
@@ -26,104 +26,83 @@ Array = npt.NDArray[np.float64]
 
 
 class Amplitude:
-    """The components of a uniform vector: a constant of the forms.
+    """The amplitudes of a load: the components of a constant of the forms, or factors of shapes whose sum is a field.
 
     Args:
-        constant: of the forms.
+        force: in the forms, the constant, or the field, a function blocked by the components.
         at: time (s) ↦ amplitudes.
+        dead: whether it keeps its direction in the frame of the hub.
+        dofs: amplitudes ↦ dofs of the field; None of a constant.
 
     Attributes:
-        follows_nodes: whether the amplitudes are values at the nodes of the mesh.
-        dead: whether it keeps its direction in the frame of the hub.
         value: the amplitudes, the same on every process; they take effect by `update`.
         vector: the force in the forms.
     """
 
-    follows_nodes: bool = False
-    dead: bool = True
-
-    def __init__(self, constant: fem.Constant, at: Callable[[float], Array]):
-        self.vector: Any = constant
-        self.value: Array = constant.value
-        self.at = at
+    def __init__(
+        self, force: Any, at: Callable[[float], Array], dead: bool, dofs: Callable[[Array], Array] | None = None
+    ):
+        self._force, self.at, self.dead, self._dofs = force, at, dead, dofs
+        self.value: Array = force.value if dofs is None else np.zeros_like(at(0.0))
+        self.vector: Any = force if force.ufl_shape else ufl.as_vector([force])
 
     def turned(self, value: Array, turn: Array) -> Array:
-        """Return the amplitudes of the turned vector (3, 3); one alone is about the axis of the turn."""
+        """Return the amplitudes of the turned vector (3, 3); of a field as they are: that is turned in `update`."""
         n = value.size
-        return np.asarray(turn[:n, :n] @ value) if n > 1 else value
+        return value if self._dofs is not None or n == 1 else np.asarray(turn[:n, :n] @ value)
 
     def update(self, turn: Array | None = None) -> None:
-        """Do nothing: the value of a constant is already set."""
-
-
-class SpanField(Amplitude):
-    """A field f(x) = Σ_k a_k s_k(x).
-
-    Args:
-        function: the field, blocked by the components.
-        basis: s_k, (k, local dofs); None where the amplitudes are the values at all nodes.
-        places: number of each local node among all of these, then.
-        at: time (s) ↦ amplitudes.
-    """
-
-    def __init__(self, function: fem.Function, basis: Array | None, places: Any, at: Callable[[float], Array]):
-        self._function, self._basis, self._places, self.at = function, basis, places, at
-        self.follows_nodes, self.value = basis is None, np.zeros_like(at(0.0))
-        self.vector = function if function.ufl_shape else ufl.as_vector([function])
-
-    @classmethod
-    def of_shapes(cls, structure: Any, load: Load, n: int) -> SpanField:
-        """Return the field of the shapes of a load, with n components."""
-        rows = structure.inner_rows
-        degree = structure.V.element.basix_element.degree if len(rows) else 1
-        f = fem.Function(_space(structure, "DG", degree, n))
-        cells, parts = f.function_space.dofmap.list, []
-        for shapes in (term.shapes for term in load.terms):
-
-            def at(x: Array, near: Array, shapes: Shapes = shapes) -> Array:
-                return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
-
-            values = field_values(at, rows, degree, f.function_space).reshape(cells.size, -1, n)
-            if shapes.region:
-                there = np.zeros(len(values), dtype=bool)
-                there[cells[structure.cells_of(shapes.region)].ravel()] = True
-                values[~there] = 0.0
-            parts.append(np.moveaxis(values, 1, 0).reshape(values.shape[1], -1))
-        basis = np.concatenate(parts)
-        return cls(f, basis, None, load.at)
-
-    @classmethod
-    def of_place(cls, structure: Any, load: PlaceLoad, n: int) -> SpanField:
-        """Return the field through the nodes of the structure.
-
-        That of a function which does not change is evaluated once, and has the single amplitude 1.
-        """
-        f = fem.Function(_space(structure, "Lagrange", structure.V.element.basix_element.degree, n))
-        index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
-        points = np.concatenate(structure.comm.allgather(x[: index.size_local]))
-        nodes = index.local_to_global(np.arange(len(x), dtype=np.int32))
-        places = tuple(map(structure.place, points))
-
-        def amplitudes(t: float) -> Array:
-            return np.ravel(first(load.on(places, t).reshape(len(places), -1), n))
-
-        if load.constant:
-            field = cls(f, amplitudes(0.0).reshape(-1, n)[nodes].reshape(1, -1), None, lambda t: np.ones(1))
-            field.follows_nodes = True
-            return field
-        return cls(f, None, nodes, amplitudes)
-
-    def turned(self, value: Array, turn: Array) -> Array:
-        """Return the amplitudes as they are: the field is turned in `update`."""
-        return value
-
-    def update(self, turn: Array | None = None) -> None:
-        """Compute the field from the amplitudes; turn vectors by a matrix (3, 3) if given."""
-        n, a = self._function.function_space.dofmap.bs, self.value
-        dofs = a @ self._basis if self._basis is not None else a.reshape(-1, n)[self._places].ravel()
+        """Compute a field from the amplitudes; turn vectors by a matrix (3, 3) if given."""
+        if self._dofs is None:
+            return
+        n, dofs = self._force.function_space.dofmap.bs, self._dofs(self.value)
         if turn is not None and n > 1:
             dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()
-        self._function.x.array[:] = dofs
+        self._force.x.array[:] = dofs
+
+
+def of_shapes(structure: Any, load: Load, n: int) -> Amplitude:
+    """Return the amplitudes of the field f(x) = Σ_k a_k s_k(x) of the shapes of a load, with n components."""
+    rows = structure.inner_rows
+    degree = structure.V.element.basix_element.degree if len(rows) else 1
+    f = fem.Function(_space(structure, "DG", degree, n))
+    cells, parts = f.function_space.dofmap.list, []
+    for shapes in (term.shapes for term in load.terms):
+
+        def at(x: Array, near: Array, shapes: Shapes = shapes) -> Array:
+            return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
+
+        values = field_values(at, rows, degree, f.function_space).reshape(cells.size, -1, n)
+        if shapes.region:
+            there = np.zeros(len(values), dtype=bool)
+            there[cells[structure.cells_of(shapes.region)].ravel()] = True
+            values[~there] = 0.0
+        parts.append(np.moveaxis(values, 1, 0).reshape(values.shape[1], -1))
+    basis: Array = np.concatenate(parts)
+    return Amplitude(f, load.at, load.kind == "dead", lambda a: np.asarray(a @ basis))
+
+
+def of_place(structure: Any, load: PlaceLoad, n: int) -> Amplitude:
+    """Return the values at the nodes of the structure, of the field through them.
+
+    That of a function which does not change is evaluated once, and has the single amplitude 1.
+    """
+    f = fem.Function(_space(structure, "Lagrange", structure.V.element.basix_element.degree, n))
+    index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
+    points = np.concatenate(structure.comm.allgather(x[: index.size_local]))
+    nodes = index.local_to_global(np.arange(len(x), dtype=np.int32))
+    places, dead = tuple(map(structure.place, points)), load.kind == "dead"
+
+    def at_nodes(t: float) -> Array:
+        return np.ravel(first(load.on(places, t).reshape(len(places), -1), n))
+
+    def dofs(a: Array) -> Array:
+        return np.ravel(a.reshape(-1, n)[nodes])
+
+    if load.constant:
+        once = dofs(at_nodes(0.0))
+        return Amplitude(f, lambda t: np.ones(1), dead, lambda a: a[0] * once)
+    return Amplitude(f, at_nodes, dead, dofs)
 
 
 def first(values: Array, n: int) -> Array:
@@ -186,7 +165,7 @@ class Loaded:
         given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
         return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
 
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+    def applied(self, name: str, load: Load) -> list[AppliedLoad]:
         """Return the work of one load."""
         dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
         if is_moment(name):
@@ -206,16 +185,15 @@ class Loaded:
         """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
         return load
 
-    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
+    def amplitude(self, name: str, load: Load, size: int) -> Any:
         """Return a load in the forms, its first `size` components, and remember its amplitude."""
-        made: Amplitude
         if isinstance(load, PlaceLoad):
-            made = SpanField.of_place(self, load, size)
+            made = of_place(self, load, size)
         elif load.is_uniform:
-            made = Amplitude(forms.constant(self.mesh, np.zeros(size)), lambda t: first(load.at(t), size))
+            constant = forms.constant(self.mesh, np.zeros(size))
+            made = Amplitude(constant, lambda t: first(load.at(t), size), load.kind == "dead")
         else:
-            made = SpanField.of_shapes(self, load, size)
-        made.dead = load.kind == "dead"
+            made = of_shapes(self, load, size)
         self.load_constants[name] = made
         return made.vector
 

@@ -16,11 +16,12 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, RootSpring, Strain
+from rotfem.mechanics.bodies import Body, RootSpring, Strain
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
-from rotfem.structures.meshes.plate_mesh import beam_nodes, boundary_tags
+from rotfem.structures.mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import Valid, field_values, not_negative
@@ -42,8 +43,6 @@ class Beam(Structure):
 
     prestress_strains: ClassVar[tuple[str, ...]] = ("axial",)
     stiff: ClassVar[tuple[str, ...]] = ("axial", "shear", "shear_2", "shear_3", "section")
-    #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
-    families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
 
     def __init__(self, problem: Problem, comm: MPI.Comm, rows: tuple[float, ...], nodes: tuple[float, ...]):
         super().__init__(problem, comm)
@@ -193,9 +192,7 @@ class PlanarBeam(Beam):
     turns_of: ClassVar = {3: 2}
     components = ("u1", "u2", "alpha")
     dimension, turns_in = 2, 1
-    #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_moment")
-    #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 2), 1)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):

@@ -20,13 +20,13 @@ from mpi4py import MPI
 from scipy.spatial import Delaunay, KDTree
 
 from rotfem.errors import ComputationError, InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
-from rotfem.mechanics.loads import AnyLoad
+from rotfem.mechanics.bodies import Body, Kinematics, Strain
+from rotfem.mechanics.loads import AppliedLoad, Load
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
-from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
+from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import ModeName, Wave, disk_wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
@@ -137,9 +137,7 @@ class Plate(Structure):
     is_flat = True
     prestress_strains: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
-    #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
-    #: Mode families: the components whose kinetic energy counts, and the one whose shape is examined.
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
@@ -304,7 +302,7 @@ class Plate(Structure):
 
     # --- loads ------------------------------------------------------------------------------------------------------
 
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+    def applied(self, name: str, load: Load) -> list[AppliedLoad]:
         """Return the work of one load: tip force and moment are spread over the edge "tip"."""
         if name.startswith("tip") and not self._has_tip:
             why = 'needs a physical curve "tip" in the mesh, which it works on'

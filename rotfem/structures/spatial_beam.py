@@ -30,7 +30,8 @@ from mpi4py import MPI
 from ufl import cross
 
 from rotfem.errors import InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain, Support
+from rotfem.mechanics.bodies import Body, Kinematics, Strain, Support
+from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
@@ -169,9 +170,7 @@ class SpatialBeam(Beam):
     planes: ClassVar = {1: (0, 2, 4), 2: (0, 1, 5)}
     dimension = 3
     prestress = "all"
-    #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ there).
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_1", "tip_moment_2", "tip_moment_3")
-    #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 5), 1), "flap": ((2, 4), 2), "torsion": ((3,), 3)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):

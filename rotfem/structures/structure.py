@@ -126,6 +126,10 @@ class Structure(Loaded):
     planes: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Whether such a plane is its middle surface, so that to first order its bending is apart from its stretching.
     is_flat: ClassVar[bool] = False
+    #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ or alpha there).
+    tip_inputs: ClassVar[tuple[str, ...]]
+    #: Family of modes ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
+    families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.

@@ -143,11 +143,10 @@ def test_sweep_writes_a_table_arrays_and_a_figure(folder: Path, rotfem: Rotfem) 
         (("--set", "motion.speed=1,2", "--", "explain"), "needs -- and a verb after it: run, modes"),
         (("--set", "motion.speed=1,2", "--", "modes", "--nonsense"), "No such option"),
         (("--set", "motion.speed=1", "--", "modes"), "must give a key several values"),
-        (("--set", "motion.speed=1:b:3", "--", "modes"), "must be first:last:number"),
-        (("--set", "motion.speed=nan:1:3", "--", "modes"), "must be first:last:number"),
-        (("--set", "loads.tip_force=[0,1],[0,2]", "--", "run"), "without commas"),
+        (("--set", "motion.speed=1:b:3", "--", "modes"), "must give a key several values"),
+        (("--set", "motion.speed=nan:1:3", "--", "modes"), "must be a number"),
         (("--set", "motion.sped=1,2", "--", "modes"), "motion.sped"),
-        (("--set", "motion.speed=1,2", "-j", "0", "--", "modes"), "must be at least 1"),
+        (("--set", "motion.speed=1,2", "-j", "0", "--", "modes"), "'-j'"),
     ],
 )
 def test_sweep_refuses(folder: Path, rotfem: Rotfem, arguments: tuple[str, ...], said: str) -> None:
@@ -169,4 +168,5 @@ def test_values_of_a_key() -> None:
     assert values_of("1,1e3 N") == ["1 N", "1e3 N"]
     assert values_of("linear,reissner") == ["linear", "reissner"]
     assert values_of("[0, 1]") == ["[0, 1]"]
+    assert values_of("[0, 1],[0, 2]") == ["[0, 1]", "[0, 2]"]
     assert values_of("10:20:11") == list(range(10, 21))  # which TOML takes for a time of day

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import pytest
 
+from rotfem.commands import console
 from rotfem.commands.cli import app
 from tests import blade_decks
 from tests.launch import environment
@@ -232,3 +233,14 @@ def test_an_interrupted_run_says_where_its_results_are(alone: Terminal, folder: 
     assert "rotfem: interrupted; results until then are in out-cut; history.csv has" in said
     assert (folder / "out-cut" / "history.csv").exists()
     assert [line for line in shown.lines if len(line) > COLUMNS] == []
+
+
+def test_lines_in_the_place_of_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where there is no terminal: after ten seconds, then at doubled times, by the pace so far."""
+    now = [0.0]
+    monkeypatch.setattr(console, "monotonic", lambda: now[0])
+    progress = console.ProgressBar("arm", True)
+    for now[0], share in ((8.0, 0.1), (10.0, 0.2), (15.0, 0.3), (30.0, 0.6), (60.0, 1.0)):
+        progress(share)
+    lines = ["arm: 20 % after 10 s, about 40 s to go", "arm: 60 % after 30 s, about 20 s to go"]
+    assert capsys.readouterr().err.splitlines() == lines

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
+from hypothesis import given, settings
 
 from rotfem.errors import InputError
 from rotfem.scene import Scene, SpatialBeamStructure
 from tests import blade_decks as decks
 from tests import blade_main_decks as mains
 from tests.blade_scenes import RIGID, STIFF
-from tests.fuzz.trying import VALIDATION, check_finite, check_message, sized, within
+from tests.fuzz.trying import VALIDATION, check_finite, check_message, within
 
 LENGTH = {"length": decks.LENGTH}
 
@@ -64,7 +65,8 @@ def files(draw: st.DrawFn) -> tuple[str, str]:
     return name, text
 
 
-@sized(files(), core=150, nightly=3000)
+@settings(max_examples=60)
+@given(files())
 def test_blade_files_of_any_kind(file: tuple[str, str]) -> None:
     name, text = file
     with tempfile.TemporaryDirectory() as folder:

@@ -8,12 +8,13 @@ from typing import Any
 
 import hypothesis.strategies as st
 import tomli_w
+from hypothesis import given, settings
 
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
-from tests.fuzz.mutants import mutants, numbers, texts, values
+from tests.fuzz.mutants import mutants
 from tests.fuzz.seeds import COMPUTED, SCENES, SEEDS
-from tests.fuzz.trying import VALIDATION, check_message, sized, within
+from tests.fuzz.trying import VALIDATION, check_message, within
 
 FOLDER = str(next(iter(SCENES)).parent)
 #: Scenes as text, without those that name other files.
@@ -33,7 +34,8 @@ def accepted(make: Any) -> Scene | None:
             return None
 
 
-@sized(mutants("all"), core=100, nightly=6000)
+@settings(max_examples=50)
+@given(mutants("all"))
 def test_tables_of_any_kind(tables: Any) -> None:
     scene = accepted(lambda: Scene.from_dict(tables, directory=FOLDER))
     if scene is not None:
@@ -53,35 +55,13 @@ def written(draw: st.DrawFn) -> bytes:
     return text
 
 
-@sized(written(), core=100, nightly=2500)
+@settings(max_examples=50)
+@given(written())
 def test_files_of_any_kind(text: bytes) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "beam.toml"
         path.write_bytes(text)
         accepted(lambda: load_scene(path))
-
-
-KEYS = [
-    "",
-    *[
-        "model.theory",
-        "time.step",
-        "time",
-        "structure.section.EA",
-        "motion.speed",
-        "structure.supports.0.x",
-        "mesh",
-        "a.b.c",
-    ],
-]
-overrides = st.one_of(
-    texts, st.builds("{}={}".format, st.one_of(st.sampled_from(KEYS), texts), st.one_of(values, texts, numbers))
-)
-
-
-@sized(st.tuples(st.sampled_from(list(SCENES)), st.lists(overrides, min_size=1, max_size=3)), core=100, nightly=1500)
-def test_overrides_of_any_kind(given: tuple[Path, list[str]]) -> None:
-    accepted(lambda: load_scene(*given))
 
 
 CELLS = [
@@ -94,7 +74,8 @@ cells = st.one_of(st.sampled_from(CELLS), st.floats().map(repr), st.text(max_siz
 lines = st.lists(cells, min_size=1, max_size=4).map(",".join)
 
 
-@sized(st.lists(lines, max_size=6).map("\n".join), core=150, nightly=2500)
+@settings(max_examples=50)
+@given(st.lists(lines, max_size=6).map("\n".join))
 def test_tables_in_files_of_any_kind(text: str) -> None:
     beam = COMPUTED["adaptive"] | {"motion": {"type": "table", "table": "speed.csv"}}
     with tempfile.TemporaryDirectory() as folder:

@@ -7,9 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-import pytest
-from hypothesis import HealthCheck, Phase, given, settings
-
 import rotfem
 from rotfem.errors import InputError
 from tests.finite import check_finite
@@ -61,31 +58,3 @@ def outcome(compute: Callable[[], Any]) -> str:
         check_finite(getattr(result, name, None), name)
     check_finite({key: value for key, value in result.summary.items() if key not in ("scene", "timings")}, "summary")
     return "done"
-
-
-def sized(strategy: Any, core: int, nightly: int) -> Callable[[Callable[..., None]], Any]:
-    """Make two tests of a property: a short one, always of the same examples, and a nightly one."""
-
-    def decorate(check: Callable[..., None]) -> Any:
-        sizes = [pytest.param(core, id="core"), pytest.param(nightly, id="nightly", marks=pytest.mark.nightly)]
-
-        @pytest.mark.parametrize("number", sizes)
-        def test(number: int) -> None:
-            @settings(
-                max_examples=number,
-                derandomize=number == core,
-                database=None,
-                deadline=None,
-                suppress_health_check=list(HealthCheck),
-                phases=(Phase.generate,),  # to make a whole computation smaller takes long
-            )
-            @given(strategy)
-            def examples(mutant: Any) -> None:
-                check(mutant)
-
-            examples()
-
-        test.__name__, test.__doc__ = check.__name__, check.__doc__
-        return test
-
-    return decorate

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.analysis.load_steps import less
+from rotfem.analysis.equilibrium import less
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import theories
 from rotfem.structures.reference_rotation import check_sections

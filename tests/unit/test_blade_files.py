@@ -59,9 +59,6 @@ def test_fast_files_are_recognised_by_their_keys(tmp_path: Path) -> None:
     assert beam.damping.kelvin_voigt == 1e-3
     other = decks.beamdyn_blade().replace("BEAMDYN V1.00", "anything")
     assert blade(tmp_path, other, structure_length=decks.LENGTH) == beam
-    (tmp_path / "bytes.dat").write_bytes(b"\0\1\2")
-    with pytest.raises(rotfem.SceneError, match="cannot be read: it is no text"):
-        read(tmp_path, "bytes.dat", structure_length=1.0)
 
 
 def test_bmodes(tmp_path: Path) -> None:
@@ -194,12 +191,12 @@ main.htc tower |  | line 6: concentrated_mass is not read; take it out
 main.htc one | type        timo => type        notimo | line 10, column 2: the type notimoschenko is not
 main.htc one | FPM 1 => FPM 0 | line 6: has 30 columns; must be 19 with centres, as FPM 0
 main.htc one | nsec 2 => nsec 3 | line 18, column 2: nsec is 3, at least 2, and there are 2 lines of sec
-main.htc one | sec 2 0.02 => sec 3 0.02 | line 20, column 2: must be section 2, not 3
+main.htc one | sec 2 0.02 => sec 3 0.02 | line 20: must be sec, its number, 2, x, y, z and twist
 main.htc one | sec 2 0.02 => sec 2 0.x2 | line 20, column 3: "0.x2" must be a finite number
-main.htc one | -0.01 20.000000 => 20.000000 | line 20: has 5 columns; must be sec, its number
+main.htc one | -0.01 20.000000 => 20.000000 | line 20: must be sec, its number, 2, x, y, z and twist: 6 columns, not 5
 main.htc one | full.st => none.st | line 13, column 2: there is no file "./none.st"
 main.htc one | set 1 1 => set 1 2 | allowed: [1, 1]
-main.htc one | set 1 1 ; =>  | line 12: begin timoschenko_input has no set
+main.htc one | set 1 1 ; =>  | line 8: the main body has no set
 main.htc one | end new_htc_structure; =>  | line 2: begin new_htc_structure has no end
 main.htc one | begin c2_def; =>  | line 27: an end without a begin
 main.htc two | copy_main_body blade1 => copy_main_body blade2 | copy each other in a circle

@@ -143,7 +143,7 @@ def test_bodies_of_hawc2_in_another_file(tmp_path: Path) -> None:
     (tmp_path / "htc" / "blade.st").write_text(decks.hawc2(True))
     with pytest.raises(rotfem.SceneError, match=r"line 13, column 2: there are several files"):
         blade(tmp_path / "htc", main, "main.htc", body="blade1")
-    with pytest.raises(rotfem.SceneError, match="continues in more than 30 files"):
+    with pytest.raises(rotfem.SceneError, match="at most 30 continue"):
         blade(tmp_path, "continue_in_file main.htc ;\n", "main.htc")
 
 

@@ -12,7 +12,7 @@ from rotfem.analysis.schemes import State
 
 def of_polynomial(p: np.polynomial.Polynomial, t: float) -> State:
     return State(
-        t, np.array([p(t)]), np.array([p.deriv()(t)]), np.array([p.deriv(2)(t)]), given=np.array([t, 2 * t, 0.0])
+        t, np.array([p(t)]), np.array([p.deriv()(t)]), np.array([p.deriv(2)(t)]), hub_work=np.array([t, 2 * t, 0.0])
     )
 
 
@@ -27,8 +27,8 @@ def test_polynomials_are_met_exactly(order: int, degree: int) -> None:
             exact = of_polynomial(p, state.t)
             off = max(abs(float(x[0] - y[0])) for x, y in zip((state.q, state.v), (exact.q, exact.v), strict=True))
             assert (off < 1e-12) == (extra == 0)
-            assert state.given is not None
-            assert state.given[0] == pytest.approx(state.t)
+            assert state.hub_work is not None
+            assert state.hub_work[0] == pytest.approx(state.t)
 
 
 def test_what_holds_linearly_at_the_ends_holds_between() -> None:

@@ -144,16 +144,3 @@ def test_what_is_public_is_documented() -> None:
     text = "\n".join(document.read_text(encoding="utf-8") for document in DOCUMENTS)
     names = [name for name in rotfem.__all__ if name != "__version__"]
     assert [name for name in names if not re.search(rf"\brotfem\.{name}\b", text)] == []
-
-
-def test_what_is_not_there_is_seen() -> None:
-    """The tests can fail."""
-    for name in ("rotfem.kinematics", "rotfem.Problem.pause", "rotfem.equations.model.Model.motto"):
-        with pytest.raises(LookupError):
-            resolve(name)
-    resolve("rotfem.equations.model.Model.terms")
-    assert missing("kinematics.Body", set())
-    assert missing("Model.motto", set())
-    assert not missing("Model.terms", set())
-    assert FILE.findall("`rotfem/hub.py`, `demos/*.toml`.") == ["rotfem/hub.py", "demos/*.toml"]
-    assert slugs(ROOT / "docs" / "theory.md") >= {"errata-of-the-source-papers"}

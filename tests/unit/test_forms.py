@@ -13,9 +13,7 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
 from rotfem.commands.problem import Problem
-from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
-from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms
 from rotfem.numerics.forms import SAME_PATTERN, Assembler
 
@@ -47,17 +45,6 @@ def test_derivatives_at_no_displacement_are_those_at_rest_without_it(space: Any)
         assert whole[kind].signature() == forms.without(at_rest[kind], q).signature()
 
 
-def test_branches_that_vanish_leave_no_conditional(space: Any) -> None:
-    """The derivative of a rate like θ̇ f(θ), f of two branches, is a sum in which UFL misses the argument otherwise."""
-    q, rate = fem.Function(space), fem.Function(space)
-    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
-    s = ufl.dot(q, q)
-    factor = ufl.conditional(ufl.lt(s, 1.0), 1 - s, ufl.cos(s))
-    moving = ufl.inner(ufl.derivative(factor * q, q, rate), v) * ufl.dx
-    at_rest = forms.without(ufl.derivative(moving, q, du) + ufl.inner(du, v) * ufl.dx, rate)
-    assert forms.form(at_rest).rank == 2
-
-
 def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> None:
     """To the last bit, whatever the form; where a form has fewer couplings than the pattern its zeros are stored."""
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
@@ -74,46 +61,6 @@ def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> Non
         assert A.getInfo()["nz_used"] == assembled.pattern.getInfo()["nz_used"]
         A.axpy(-1.0, assembled(form), SAME_PATTERN)
         assert A.norm() == 0.0
-
-
-def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
-    """In the cells, at their ends, and of nothing in one pass; sums over three cells differ by round-off."""
-    u = fem.Function(space)
-    u.x.array[:] = np.random.default_rng(3).standard_normal(len(u.x.array))
-    parts = {"square": ufl.dot(u, u) * ufl.dx, "ends": u[0] * u[1] * ufl.ds, "both": u[0] * ufl.dx + u[1] ** 3 * ufl.ds}
-    found = Functionals(parts, space.mesh)()
-    for name, form in parts.items():
-        assert found[name] == pytest.approx(fem.assemble_scalar(fem.form(form)), rel=1e-13)
-    assert Functionals({}, space.mesh)() == {}
-
-
-@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
-def test_known_forms_are_those_made_anew(theory: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a tapered blade with a tip mass, gravity and damping: to the last digit on another mesh."""
-    section = {"EA": 1e6, "GA2": 4e5, "GA3": 4e5, "GJ": 1e4, "EI2": 1e3, "EI3": [[0.0, 9e3], [2.0, 3e3]]}
-    section |= {"polar_radius": 0.0, "mass_per_length": 1.0}
-    structure = {"type": "spatial_beam", "length": 2.0, "section": section, "tip_mass": 0.5, "precone": 0.1}
-
-    def matrices(elements: int, speed: float) -> list[Any]:
-        tables = {
-            "structure": structure | {"damping": {"kelvin_voigt": 1e-4}},
-            "motion": {"type": "constant", "speed": speed, "axis": [0, 0, 1]},
-            "loads": {"gravity": [0.0, 0.0, -9.81]},
-            "model": {"theory": theory},
-            "mesh": {"elements": elements},
-        }
-        system = compile_system(Problem.of(tables), moving=False)
-        system.set_time(0.0)
-        system.set_state(1e-3 * np.arange(len(system.zeros())))
-        return [A.getValuesCSR()[2] for A in system.mass_damping_stiffness()] + [system.residual().array.copy()]
-
-    monkeypatch.setattr(model_module, "_KNOWN", {})
-    matrices(3, 5.0)
-    assert len(model_module._KNOWN) == (2 if theory == "consistent_linear" else 1)  # the stress stiffness apart
-    shared = matrices(5, 7.0)
-    monkeypatch.setattr(model_module, "_KNOWN", {})
-    for known, made in zip(shared, matrices(5, 7.0), strict=True):
-        np.testing.assert_array_equal(known, made)
 
 
 def test_a_large_flat_plate_has_no_entries_between_what_is_in_and_across_it(monkeypatch: pytest.MonkeyPatch) -> None:

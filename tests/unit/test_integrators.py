@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from rotfem.analysis.schemes import AlphaFamily, GeneralisedAlpha, Newmark, State
-from rotfem.commands.problem import scheme_of
-from rotfem.scene import Scene, Time
 
 RADII = (0.0, 0.3, 0.5, 0.8, 0.9, 1.0)
 SCHEMES = [*map(GeneralisedAlpha, RADII), Newmark(), Newmark(0.3025, 0.6)]
@@ -52,36 +50,6 @@ def test_second_order(scheme: AlphaFamily) -> None:
     assert np.log2(error(0.02) / error(0.01)) == pytest.approx(3.0, abs=0.05)
 
 
-def test_newmark_is_the_trapezoidal_rule() -> None:
-    s = Newmark()
-    assert s.coefficients == (0.0, 0.0, 0.25, 0.5)
-    np.testing.assert_allclose(abs(np.linalg.eigvals(amplification(s, 0.7)))[:2].max(), 1.0, atol=1e-14)
-
-
-def test_first_order_without_its_identity() -> None:
-    """The test of order can fail: Newmark with gamma = 0.6 is of first order."""
-    s = Newmark(0.3025, 0.6)
-    errors = [np.min(np.abs(np.linalg.eigvals(amplification(s, w)) - np.exp(1j * w))) for w in (0.02, 0.01)]
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_shifts_are_the_derivatives_of_the_update(scheme: AlphaFamily) -> None:
-    """c_q, c_v, c_m = ∂(q, v, q̈)/∂q by differences of the update maps (linear, so to round-off)."""
-    alpha_m, alpha_f, beta, gamma = scheme.coefficients
-    h = 0.01
-
-    def update(a1: float) -> tuple[float, float, float]:
-        q = 1 + h * 2 + h * h * ((0.5 - beta) * 3 + beta * a1)
-        v = 2 + h * ((1 - gamma) * 3 + gamma * a1)
-        acceleration = ((1 - alpha_m) * a1 + alpha_m * 3 - alpha_f * 4) / (1 - alpha_f)
-        return q, v, acceleration
-
-    one, zero = np.array(update(1.0)), np.array(update(0.0))
-    stage = scheme.stage(0, state(1.0, 2.0, 4.0, 3.0), h, h, [])
-    np.testing.assert_allclose(stage.shifts, (one - zero) / (one - zero)[0], rtol=1e-9)
-
-
 def state(q: float, v: float, a: float, auxiliary: float) -> State:
     """Return the state of one unknown at t = 0."""
     return State(0.0, *(np.array([x]) for x in (q, v, a)), memory=np.array([auxiliary]))
@@ -100,25 +68,3 @@ def test_stage_and_finish_are_the_definitions(scheme: AlphaFamily) -> None:
     np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-14)
     assert end.a[0] == pytest.approx(-(omega**2) * end.q[0], rel=1e-12)
     assert end.t == h
-
-
-def test_scheme_of_a_scene() -> None:
-    section = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
-    tables = {
-        "structure": {"type": "planar_beam", "length": 1.0, "section": section},
-        "motion": {"type": "constant", "speed": 1.0},
-        "time": {"end": 1.0, "step": 0.1},
-    }
-    scene = Scene.from_dict(tables)
-
-    def of(changes: dict[str, object]) -> AlphaFamily:
-        time = scene.replace(changes).time
-        assert isinstance(time, Time)
-        scheme = scheme_of(time)
-        assert isinstance(scheme, AlphaFamily)
-        return scheme
-
-    assert of({}) == GeneralisedAlpha(0.9)
-    assert of({"time.spectral_radius": 0.2}) == GeneralisedAlpha(0.2)
-    assert of({"time.scheme": "newmark"}) == Newmark()
-    assert of({"time.scheme": "newmark", "time.beta": 0.3}) == Newmark(0.3, 0.5)

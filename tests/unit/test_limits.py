@@ -28,11 +28,6 @@ def changed(**changes: Any) -> Scene:
     return Scene.from_dict(TABLES).replace({key.replace("__", "."): value for key, value in changes.items()})
 
 
-def test_a_table_of_limits_says_what_takes_its_place() -> None:
-    with pytest.raises(SceneError, match=r"limits: unknown key; leave it out: .* ROTFEM_MEMORY"):
-        changed(limits__steps=7)
-
-
 def test_memory_is_asked_for_before_the_mesh_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind in (rotfem.run, rotfem.modes):
         with pytest.raises(SceneError, match=r"mesh.elements = 1000000000: makes 9e\+09 unknowns.*ROTFEM_MEMORY"):
@@ -86,28 +81,6 @@ def test_a_summary_refers_to_a_long_table(tmp_path: Path) -> None:
 
 
 # --- messages --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[{}]\n".format(".".join("a" * 5000)),
-        ".".join("a" * 5000) + " = 1\n",
-        "a = " + "[" * 5000,
-    ],
-)
-def test_what_is_nested_without_end_is_refused_in_words(tmp_path: Path, text: str) -> None:
-    (tmp_path / "beam.toml").write_text(text)
-    with pytest.raises(SceneError, match="nested too deep"):
-        load_scene(tmp_path / "beam.toml")
-
-
-def test_tables_of_a_script_are_not_nested_without_end_either() -> None:
-    nested: dict[str, Any] = {}
-    for _ in range(5000):
-        nested = {"a": nested}
-    with pytest.raises(SceneError, match="nested too deep"):
-        Scene.from_dict({"structure": nested})
 
 
 def test_values_are_shown_briefly_and_in_one_line() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.structures.meshes.gmsh_file import BadMesh, read
+from rotfem.structures.mesh import BadMesh, read
 from tests.launch import rotfem
 from tests.plate_mesh_files import PLATE_SCENE, grid, write_msh
 

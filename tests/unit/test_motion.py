@@ -87,20 +87,6 @@ def test_the_angle_of_a_table_is_zero_at_the_start(kind: str, start: float) -> N
     assert (m.angle(0.0), m.angle(4.0)) == pytest.approx((0.0, 12.0), abs=1e-12)
 
 
-def test_a_spin_up_is_the_same_at_many_times_at_once() -> None:
-    motion, t = Motion.spin_up(6.0, 15.0), np.linspace(0.0, 20.0, 41)
-    assert motion.arrays
-    for f in (motion.speed, motion.rate):
-        np.testing.assert_allclose(np.asarray(f(t)), [f(float(s)) for s in t], rtol=1e-13, atol=1e-15)
-
-
-def test_constant_says_so() -> None:
-    assert motion(MOTIONS["constant"]).constant
-    assert not motion(MOTIONS["spin_up"]).constant
-    assert not motion(MOTIONS["constant"] | {"base_acceleration": [[0, 0.0, 0.0], [1, 1.0, 0.0]]}).constant
-    assert motion(MOTIONS["constant"] | {"base_acceleration": [1.0, 0.0]}).constant
-
-
 def test_rotation_turns_by_the_angle() -> None:
     m = motion(MOTIONS["spin_up"])
     Q, psi = m.rotation(1.2), m.angle(1.2)
@@ -108,13 +94,6 @@ def test_rotation_turns_by_the_angle() -> None:
     np.testing.assert_allclose(Q @ Q.T, np.eye(3), atol=1e-15)
     other = motion(MOTIONS["spin_up"] | {"axis": [0, 0, -2]})
     np.testing.assert_allclose(other.rotation(1.2), Q.T, atol=1e-15)
-
-
-def test_at_speed_keeps_axis_and_base() -> None:
-    m = motion(MOTIONS["spin_up"] | {"axis": [0, 0, -1], "base_acceleration": [1.0, 2.0]}).at_speed(5.0)
-    assert (m.speed(3.0), m.rate(3.0), m.angle(3.0)) == (5.0, 0.0, 15.0)
-    np.testing.assert_array_equal(m.axis, [0, 0, -1])
-    np.testing.assert_array_equal(m.base_acceleration(0.0), [1, 2, 0])
 
 
 @pytest.mark.parametrize("fixed", [False, True])

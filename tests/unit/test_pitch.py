@@ -101,20 +101,6 @@ def test_refused(pitch: Any, more: dict[str, Any], key: str) -> None:
     assert caught.value.key.startswith(key)
 
 
-@pytest.mark.parametrize(
-    ("function", "said"),
-    [
-        (lambda t: 1 / (t - t), "raised ZeroDivisionError"),
-        (lambda t: "much", "must return a number"),
-        (lambda t: np.nan, "finite number"),
-        (lambda t: [0.1, 0.2], "must return a number"),
-    ],
-)
-def test_functions_that_are_none(function: Any, said: str) -> None:
-    with pytest.raises(SceneError, match=said):
-        signal(function)
-
-
 def searched(function: Any) -> None:
     """Search the angle of a pitch and its rate for jumps."""
     for f in (function, Derivative(function, 1, 0.32, (0.0,))):
@@ -129,21 +115,14 @@ def test_a_pitch_or_its_rate_that_jumps_is_refused(function: Any, at: float) -> 
     assert float(str(caught.value).split("t = ")[1].split(" s")[0]) == pytest.approx(at, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    "function",
-    [lambda t: 0.3, lambda t: 0.3 + 1e-9 * np.sin(t), lambda t: np.sin(40 * t), lambda t: max(t - 1.0, 0.0) ** 2],
-)
-def test_what_is_smooth_is_not(function: Any) -> None:
-    searched(function)
-
-
 def test_dead_loads_keep_their_direction_in_the_hub() -> None:
     """Amplitudes times shapes are Rᵀ f at every place, of the load itself as of one over the span."""
     axis = np.array([0.6, 0.0, 0.8])
     pitch = Pitch(lambda t: 0.2 + t, lambda t: 1.0, lambda t: 0.0, axis, np.zeros(3), start=0.2)
     shapes = Shapes.along_span([[0.0, 1.0, 2.0, 3.0], [4.0, -1.0, 0.5, 0.0]])
     given = Load("dead", (Term.table([[0, 1.0], [2, 3.0]], shapes),))
-    loads = Loads(named={"distributed": given, "tip_force": Load.of_components((1.0, 2.0, 3.0))}).pitched(pitch)
+    uniform = Load("dead", (Term(Shapes.uniform([(1.0, 2.0, 3.0)])),))
+    loads = Loads(named={"distributed": given, "tip_force": uniform}).pitched(pitch)
     spread, same = loads.named["distributed"], loads.named["tip_force"]
     assert isinstance(spread, Load)
     assert isinstance(same, Load)

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 import rotfem
 from rotfem.commands.processes import SHARED_FROM, communicator, shared_out, unknowns
-from rotfem.errors import ComputationError, InputError
+from rotfem.errors import InputError
 from rotfem.scene import as_scene
 from tests.beams import STRUCTURE
 
@@ -62,9 +62,3 @@ def test_every_item_is_done_by_one_rank(number: int, size: int) -> None:
         parts.append(shared_out(range(number), lambda i: i, comm))
     assert [i for part in parts for i in part] == list(range(number))
     assert max(map(len, parts)) - min(map(len, parts)) <= 1
-
-
-def test_an_error_on_one_rank_is_one_on_all() -> None:
-    comm: Any = Ranks(0, 2, [([], ComputationError("no equilibrium"))])
-    with pytest.raises(ComputationError, match="no equilibrium"):
-        shared_out([1, 2], lambda i: i, comm)

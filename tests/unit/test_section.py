@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 import rotfem
 from rotfem import registry
@@ -35,22 +34,6 @@ def spatial(**section: Any) -> SpatialSection:
     scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
     assert isinstance(scene.structure, SpatialBeamStructure)
     return scene.structure.section
-
-
-def test_stiffness_way_returns_what_was_given() -> None:
-    section = planar(EA=1, GA=2, EI=3, mass_per_length=4, rotary_inertia=5)
-    assert section.uniform
-    assert section.knots == [0.0]
-    values = section.at(X)
-    assert list(values) == ["EA", "GA", "EI", "mass_per_length", "rotary_inertia"]
-    for value, expected in zip(values.values(), (1, 2, 3, 4, 5), strict=True):
-        np.testing.assert_array_equal(value, np.full(3, float(expected)))
-
-
-def test_rotary_inertia_is_optional() -> None:
-    section = planar(EA=1, GA=2, EI=3, mass_per_length=4)
-    assert not section.has_rotary_inertia
-    np.testing.assert_array_equal(section.at(X)["rotary_inertia"], np.zeros(3))
 
 
 def test_material_way_default_and_given_shear_correction() -> None:
@@ -101,16 +84,6 @@ def test_taper_interpolates_dimensions_before_properties() -> None:
     np.testing.assert_allclose(section.at(1.25)["EI"], 210e9 * 0.1 * 0.125**3 / 12)
 
 
-def test_uniform_taper_counts_as_uniform() -> None:
-    assert planar(EA=[[0, 1], [2, 1]], GA=2, EI=3, mass_per_length=4).uniform
-
-
-def test_taper_end_tolerance() -> None:
-    planar(EA=[[0, 1], [2 * (1 + 5e-10), 1]], GA=2, EI=3, mass_per_length=4)
-    with pytest.raises(SceneError, match="it ends at 1.9"):
-        planar(EA=[[0, 1], [1.9, 1]], GA=2, EI=3, mass_per_length=4)
-
-
 def test_incomplete_section_lists_the_possible_sets() -> None:
     with pytest.raises(SceneError) as caught:
         planar(EA=1)
@@ -132,19 +105,6 @@ def test_a_planar_beam_refuses_a_centroid_off_its_axis_in_the_plane() -> None:
         assert caught.value.key == "structure.section.shape"
     finally:
         registry.shapes.remove("moved")
-
-
-def test_section_is_frozen() -> None:
-    section = planar(EA=1, GA=2, EI=3, mass_per_length=4)
-    with pytest.raises(ValidationError):
-        section.EA = 5.0
-
-
-def test_spatial_diagonal() -> None:
-    values = spatial(**SPATIAL, rotary_inertia2=0.5, rotary_inertia3=0.25).at(X)
-    assert values["stiffness"].shape == values["mass"].shape == (3, 6, 6)
-    np.testing.assert_array_equal(values["stiffness"][1], np.diag([3.0, 1, 2, 5, 7, 11]))
-    np.testing.assert_array_equal(values["mass"][1], np.diag([13, 13, 13, 0.75, 0.5, 0.25]))
 
 
 def test_spatial_offsets_follow_rigid_body_kinematics() -> None:
@@ -208,11 +168,6 @@ def test_definiteness_does_not_depend_on_units() -> None:
     assert section.at(0.0)["stiffness"][5, 5] == 1e-3
 
 
-def test_mass_without_rotary_part() -> None:
-    section = spatial(**SPATIAL)
-    assert not section.has_rotary_inertia
-
-
 @pytest.mark.parametrize(
     ("width", "height", "constant"),
     # Timoshenko & Goodier, Theory of Elasticity, §109: k₁ for side ratios 1, 2 and 10.
@@ -230,13 +185,6 @@ def test_spatial_rectangle_axes_and_mass() -> None:
     assert stiffness[4, 4] == pytest.approx(210e9 * flap)
     assert stiffness[5, 5] == pytest.approx(210e9 * lag)
     np.testing.assert_allclose(np.diag(mass)[3:], 7800 * np.array([flap + lag, flap, lag]))
-
-
-def test_spatial_material_way() -> None:
-    properties = {"area": 2e-3, "second_moment2": 1e-6, "second_moment3": 3e-6, "torsion_constant": 2e-6}
-    stiffness = spatial(**MATERIAL, **properties).at(X)["stiffness"]
-    expected = np.diag([210e9 * 2e-3, 5 / 6 * G * 2e-3, 5 / 6 * G * 2e-3, G * 2e-6, 210e9 * 1e-6, 210e9 * 3e-6])
-    np.testing.assert_allclose(stiffness, np.broadcast_to(expected, (3, 6, 6)))
 
 
 def test_spatial_taper() -> None:

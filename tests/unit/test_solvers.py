@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,7 +11,6 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import linear
-from rotfem.numerics.eigenproblem import mirror_error
 from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular, symmetric
 from rotfem.numerics.newton import Factor, Newton
 from rotfem.numerics.projection import LowRank, PlusLowRank, times, times_transposed
@@ -56,88 +55,11 @@ def test_an_old_slope_is_kept_as_long_as_it_serves(slope: float, made: int) -> N
     assert len(slopes) == 1 + made
 
 
-def test_a_linear_problem_takes_two_iterations_at_first_and_one_then() -> None:
-    """The second increment is zero, which shows that the problem is linear: kappa = 0, and one is enough afterwards."""
-    newton = Newton()
-    for expected in (2, 1):
-        assert newton.solve(*methods(Scalar(lambda x: 3 * x - 6, lambda x: 3, 0.0))) == expected
-
-
-def test_one_iteration_is_enough_once_the_quadratic_constant_is_known() -> None:
-    """A start 1e-6 off has a next increment of 1e-12·f''/2f', below tolerance; the result is as exact as promised."""
-    newton = Newton(tolerance=1e-9)
-    newton.solve(*methods(Scalar(lambda x: x * x - 2, lambda x: 2 * x, 1.5)))
-    near = Scalar(lambda x: x * x - 2, lambda x: 2 * x, np.sqrt(2) + 1e-6)
-    assert newton.solve(*methods(near)) == 1
-    assert abs(near.x - np.sqrt(2)) < 1e-9
-    far = Scalar(lambda x: x * x - 2, lambda x: 2 * x, np.sqrt(2) + 1e-2)
-    assert newton.solve(*methods(far)) > 1
-
-
-def methods(root: Scalar) -> tuple[Callable[[], float], Callable[[], float]]:
-    return root.increment, root.size
-
-
-def test_too_many_iterations() -> None:
-    """x³ has a triple root: increments fall by a third only."""
-    root = Scalar(lambda x: x**3, lambda x: 3 * x * x, 1.0)
-    with pytest.raises(ComputationError, match="did not converge in 7 iterations.*wanted 1e-09"):
-        Newton(max_iterations=7).solve(*methods(root))
-
-
-def increments(values: Iterable[float]) -> Callable[[bool], tuple[float, bool]]:
-    """Return increments of Newton's method that have these sizes, one after the other."""
-    rest = iter(values)
-    return lambda renewed: (next(rest), False)
-
-
-def test_not_finite() -> None:
-    with pytest.raises(ComputationError, match="iteration 3 gave an increment that is not finite"):
-        Newton().solve(increments((1.0, 0.5, np.nan)), lambda: 1.0)
-
-
-def test_divergence() -> None:
-    """arctan from x = 2: increments grow without end."""
-    with pytest.raises(ComputationError, match="diverged|not finite"):
-        Newton().solve(*methods(Scalar(np.arctan, lambda x: 1 / (1 + x * x), 2.0)))
-
-
-def test_growth_on_the_way_is_remembered() -> None:
-    """The root may be another one then; of the next solve it says nothing, nor does growth at the level of noise."""
-    newton = Newton()
-    for values, diverging in (([1e-2, 1e-3, 5e-3, 1e-12], True), ([1e-2, 1e-5, 2e-5, 1e-12], False)):
-        assert newton.solve(increments(values), lambda: 1.0) == 4
-        assert newton.diverging == diverging
-
-
-def test_stops_at_round_off_and_says_so() -> None:
-    """Increments that no longer shrink, small beside the unknown, are round-off; large ones are not."""
-    newton = Newton(tolerance=1e-9)
-    assert newton.solve(increments((1e-2, 1e-5, 3e-8, 2e-8, 2e-8, 2e-8)), lambda: 1.0) == 6
-    assert newton.roundoff == 2e-8
-    with pytest.raises(ComputationError, match="did not converge"):
-        Newton().solve(increments([1e-2] * 30), lambda: 1.0)
-
-
 def matrix(values: list[list[float]]) -> PETSc.Mat:
     A = PETSc.Mat().createDense((len(values), len(values)), array=np.array(values))
     A = A.convert("aij")
     A.assemble()
     return A
-
-
-def test_direct_solver_refactors_only_when_told() -> None:
-    A = matrix([[2.0, 1.0], [1.0, 3.0]])
-    solver, b = DirectSolver(A), A.createVecLeft()
-    b.set(1.0)
-    for _ in range(2):
-        x = solver.solve(b)
-    np.testing.assert_allclose(x, [0.4, 0.2])
-    assert solver.factorisations == 1
-    A.scale(2.0)
-    solver.refresh()
-    np.testing.assert_allclose(solver.solve(b), [0.2, 0.1])
-    assert solver.factorisations == 2
 
 
 def test_a_singular_matrix_is_a_computation_error() -> None:
@@ -199,20 +121,6 @@ def test_a_small_skew_part_is_none_of_round_off() -> None:
     A.setValue(0, 39, A[0, 39] + 1e-9 * np.abs(A[:, :]).max())
     A.assemble()
     assert not symmetric(A)
-
-
-def test_combine() -> None:
-    A, B = matrix([[1.0, 2.0], [3.0, 4.0]]), matrix([[1.0, 1.0], [1.0, 1.0]])
-    target = A.duplicate()
-    combine(target, [A, B], np.array([2.0, -1.0]))
-    np.testing.assert_array_equal(target.convert("dense").getDenseArray(), [[1, 3], [5, 7]])
-
-
-def test_a_zero_eigenvalue_is_its_own_mirror() -> None:
-    """Of a hub that turns freely, say; the others are judged as without it."""
-    assert mirror_error(np.array([0.0, 1j, -1j, 2j, -2j])) == 0.0
-    lopsided = np.array([0.0, 0.1 + 1j, -0.11 + 1j, 9j, -9j])
-    assert mirror_error(lopsided) == pytest.approx(0.01 / abs(0.1 + 1j), rel=1e-9)
 
 
 def test_what_a_singular_matrix_does_not_feel_follows_the_other() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError, run
-from rotfem.analysis.time_grid import FEW, TimeGrid, find_jumps
+from rotfem.analysis.time_grid import find_jumps
 from rotfem.mechanics.time_signals import TimeSignal
 from tests.beams import STRUCTURE
 
@@ -33,19 +33,6 @@ def test_a_jump_is_found_to_round_off(at: float) -> None:
 @pytest.mark.parametrize("f", [lambda t: np.sin(7 * t), lambda t: abs(t - 0.5033), lambda t: np.sqrt(t), lambda t: 2.0])
 def test_what_is_continuous_has_no_knots(f: Any) -> None:
     assert len(searched(f).knots) == 0
-
-
-def test_steps_have_legs_from_knot_to_knot_or_one_with_a_line() -> None:
-    """Up to FEW knots are landed on, more are not; a knot at the end of a step makes no leg of its own."""
-    few, many = np.linspace(0.11, 0.19, FEW), np.linspace(0.31, 0.39, FEW + 1)
-    signal = TimeSignal("a", lambda t: t, np.concatenate([few, [0.3], many]))
-    legs = list(TimeGrid([signal], np.linspace(0.0, 0.5, 6), 0.1))
-    np.testing.assert_allclose([leg.end for leg in legs], [0.1, *few, 0.2, 0.3, 0.4, 0.5], rtol=1e-12)
-    assert [leg.lands for leg in legs] == [False, *FEW * [True], False, True, False, False]
-    assert [leg.whole for leg in legs] == [True, *FEW * [False], *4 * [True]]
-    assert [leg.line for leg in legs] == [*(FEW + 3) * [None], pytest.approx((0.3, 0.4, 1)), None]
-    whole = list(TimeGrid([signal], np.linspace(0.0, 0.5, 6), 0.1, lands=False))
-    assert [leg.line is not None for leg in whole] == [False, True, False, True, False]
 
 
 @pytest.mark.parametrize("degree", [1, 3])

@@ -88,7 +88,7 @@ def reference() -> Callable[[str], Path]:
     return reference_file
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def unestimated(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the estimates of errors, as output.error = false does: they move no answer (tests.pairs).
 

@@ -12,6 +12,8 @@ import rotfem
 from rotfem.results.distance import Series
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.estimated
+
 SECTION = STRUCTURE["section"]
 BEAM = {"type": "planar_beam", "length": 10.0, "section": SECTION}
 T = np.linspace(0.0, 3.0, 151)

@@ -16,6 +16,8 @@ from rotfem.commands.campbell import parse_speeds
 from rotfem.errors import Stopped
 from rotfem.results import CampbellResult
 
+pytestmark = pytest.mark.estimated
+
 Array = npt.NDArray[np.float64]
 
 MESH = {"elements": 12, "degree": 3}

@@ -17,6 +17,8 @@ from rotfem.errors import Stopped
 
 from .conftest import SPIN_UP, reference_file
 
+pytestmark = pytest.mark.estimated
+
 END = 10.0
 SCENE = {**SPIN_UP, "time": {"end": END, "step": 0.01, "output_every": 2}}
 SHORT = {**SPIN_UP, "mesh": {"elements": 4, "degree": 2}, "time": {"end": 1.0, "step": 0.02}}

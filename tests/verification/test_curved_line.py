@@ -117,28 +117,6 @@ def test_kinked_line_is_the_kinked_sweep() -> None:
         assert beam(one).reference_line.at(1.4)[1] == pytest.approx(np.array([[np.cos(0.6), np.sin(0.6), 0.0]]))
 
 
-def test_straight_line_is_no_line() -> None:
-    # A line through the clamp in any direction is the beam turned, precone among them: t₁ of precone 0.3.
-    along = 2.0 * np.array([np.cos(0.3), 0.0, np.sin(0.3)])
-    by_line = scene({"line": [[0.0, 0.0, 0.0], along]}, 3.0)
-    np.testing.assert_allclose(found(by_line), found(scene({"length": 2.0, "precone": 0.3}, 3.0)), rtol=1e-9)
-
-
-def test_places_on_the_line() -> None:
-    # Sweep and bend in signs: towards 2 and 3 where positive; a unit tangent is the derivative of the position.
-    line = beam(scene({"line": curve(np.linspace(0.0, 2.0, 17))})).reference_line
-    assert line is not None
-    x = np.linspace(0.1, line.length - 0.1, 7)
-    before, after = line.at(x - 1e-5)[0], line.at(x + 1e-5)[0]
-    position, tangent = line.at(x)
-    np.testing.assert_allclose((after - before) / 2e-5, tangent, atol=1e-8)
-    np.testing.assert_allclose(np.linalg.norm(tangent, axis=1), 1.0, rtol=1e-14)
-    np.testing.assert_allclose(position[:, 1], 0.2 * position[:, 0] ** 2, atol=4e-6)
-    sweep, bend = line.angles(x)
-    assert np.all(sweep > 0.0)
-    assert np.all(bend < 0.0)
-
-
 def test_line_in_a_file_and_its_length(tmp_path: Any) -> None:
     (tmp_path / "line.csv").write_text("x, y, z\n0,0,0\n1,0,0\n2,0,0.1\n")
     structure = {"type": "spatial_beam", "section": SECTION, "line": "line.csv"}

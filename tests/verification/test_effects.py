@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import ufl
-from ufl.algorithms import expand_derivatives
 
 from rotfem import Scene, registry, run
 from rotfem.commands.problem import Problem
 from rotfem.equations.model import Model
-
-pytestmark = pytest.mark.usefixtures("unestimated")
 
 Array = npt.NDArray[np.float64]
 
@@ -53,44 +49,6 @@ def test_an_effect_that_is_off_leaves_nothing_behind(unit_beam: Any, theory: str
 def without(problem: Problem, *names: str) -> Problem:
     """Return the problem with all effects but these."""
     return problem.replace(effects=tuple(e for e in PRESENT if e not in names))
-
-
-def counts(model: Model) -> tuple[int, int]:
-    """Return the numbers of integrals in the residual and in its tangent."""
-    F, k = model.residual, model.structure.k
-    du = ufl.TrialFunction(model.structure.V)
-    J = sum(ufl.derivative(F, x, du) for x in (k.q, k.v, k.a))
-    return len(expand_derivatives(F).integrals()), len(expand_derivatives(J).integrals())
-
-
-@pytest.mark.parametrize("name", PRESENT)
-def test_an_effect_that_is_off_leaves_no_integral(unit_beam: Any, name: str) -> None:
-    problem = Problem.of(unit_beam(ALL | {"mesh.degree": 1}))
-    full, less = counts(Model(problem)), counts(Model(without(problem, name)))
-    assert less[0] < full[0]
-    if name in ("base", "gravity"):  # forces that do not depend on q are not in the tangent anyway
-        assert less[1] == full[1]
-    else:
-        assert less[1] < full[1]
-
-
-def test_least_integrals(unit_beam: Any) -> None:
-    """Three strains and one inertia are the least; rotary inertia adds one."""
-    for effects, expected in (([], 4), (["rotary_inertia"], 5), ("auto", 5)):
-        scene = unit_beam({"model.effects": effects, "mesh.degree": 1}, time=TIME)
-        assert counts(Model(Problem.of(scene)))[0] == expected
-
-
-def test_pieces_of_a_linear_theory(unit_beam: Any) -> None:
-    """A linear theory has pieces for each operator of each effect; what is off is missing."""
-    changes = {"model.theory": "consistent_linear", "motion": ALL["motion"], "mesh.degree": 1}
-    problem = Problem.of(unit_beam(changes))
-    full, less = problem.system(), problem.replace(effects=("rotary_inertia",)).system()
-    stiffness, mass, director = ({"internal", ""}, {"inertia", "structure"}, {"inertia", "rotary_inertia"})
-    assert [(p.kind, p.key) for p in less.pieces] == [("K", ()), ("M", ()), ("M", ())]
-    assert [set(p.of) for p in less.pieces] == [stiffness, director, mass]
-    constants = {name for p in full.pieces for name, _ in p.key}
-    assert constants == {"w", "dw", "a_o"}
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,8 @@ from rotfem.accuracy import errors as module
 from rotfem.accuracy.errors import rounded_down
 from rotfem.results.distance import Series
 
+pytestmark = pytest.mark.estimated
+
 EI, LENGTH = 1.4e4, 10.0
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": EI, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
 BEAM = {"type": "planar_beam", "length": LENGTH, "section": SECTION}

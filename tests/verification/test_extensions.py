@@ -18,8 +18,6 @@ from rotfem import registry
 from rotfem.errors import SceneError
 from tests.beams import STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 FILES = Path(__file__).resolve().parents[2] / "demos" / "extensions"
 KINDS = (registry.theories, registry.effects, registry.schemes, registry.shapes, registry.outputs)
 
@@ -89,19 +87,15 @@ def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str
     tables = {"structure": plate, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "half_square"}}
     with pytest.raises(SceneError, match="has strains for planar_beam, none for a plate"):
         rotfem.Scene.from_dict(tables)
-    assert "half_square" not in [
-        row["name"] for row in rotfem.explain(rotfem.Scene.from_dict({**tables, "model": {}})).rows
-    ]
 
 
 # --- an effect --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
-def test_effect_on_a_free_hub(extension: Callable[[str], ModuleType], theory: str) -> None:
+def test_effect_on_a_free_hub(extension: Callable[[str], ModuleType]) -> None:
     """Impulse = momentum with drag, by the trapezoidal rule in both: the error is of the second order of the step."""
     extension("linear_drag")
-    errors = []
+    theory, errors = "reissner", []
     for step in (0.01, 0.005):
         done = rotfem.run(free_hub({"model.theory": theory, "time.step": step}))
         assert "drag" in done.summary["effects"]
@@ -113,17 +107,6 @@ def test_effect_on_a_free_hub(extension: Callable[[str], ModuleType], theory: st
     assert without.history["psi_dot"][-1] > 1.01 * h["psi_dot"][-1]
     assert errors[1] <= 2e-5
     assert errors[1] < 0.3 * errors[0]
-
-
-def test_effect_slows_a_rigid_wheel(extension: Callable[[str], ModuleType]) -> None:
-    """I ω' = −c L³/3 ω for a beam that does not bend: ω = ω₀ exp(−c L³ t/3 I); what still bends makes 2e-5."""
-    drag = extension("linear_drag").DRAG
-    stiff = {**KRB, "EI": 1.4e8, "GA": 1e9, "EA": 2.8e9, "rotary_inertia": 0.0}
-    motion = {"type": "torque", "hub_inertia": 200.0, "speed": 1.0}
-    scene = free_hub({"motion": motion, "structure.section": stiff, "time": {"end": 2.0, "step": 0.02}})
-    h = rotfem.run(scene).history
-    inertia = 200.0 + 1.2 * 10.0**3 / 3
-    assert h["psi_dot"][-1] == pytest.approx(np.exp(-drag * 10.0**3 / 3 * 2.0 / inertia), rel=2e-5)
 
 
 def test_effect_damps_modes_and_is_explained(extension: Callable[[str], ModuleType]) -> None:
@@ -146,7 +129,7 @@ def values(make: Callable[..., rotfem.Scene], scheme: str, column: str, steps: t
     return [float(rotfem.run(scene).history[column][-1]) for scene in scenes]
 
 
-@pytest.mark.parametrize(("kind", "column"), [("fixed", "tip_u2"), ("free hub", "psi_dot"), ("inertial", "tip_u2")])
+@pytest.mark.parametrize(("kind", "column"), [("inertial", "tip_u2"), ("free hub", "psi_dot")])
 def test_schemes_of_second_order(extension: Callable[[str], ModuleType], kind: str, column: str) -> None:
     frame = {"model.frame": "inertial"} if kind == "inertial" else {}
     base = free_hub if kind == "free hub" else beam
@@ -163,15 +146,14 @@ def test_schemes_of_second_order(extension: Callable[[str], ModuleType], kind: s
         assert c + (c - b) / 3 == pytest.approx(fine + (fine - coarse) / 3, rel=2e-4), scheme
 
 
-@pytest.mark.parametrize("kind", ["fixed", "free hub"])
-def test_a_scheme_of_fifth_order_with_coupled_stages(extension: Callable[[str], ModuleType], kind: str) -> None:
-    """Of a section so soft in every way that these steps resolve all motions, under a smooth speed or torque."""
+def test_a_scheme_of_fifth_order_with_coupled_stages(extension: Callable[[str], ModuleType]) -> None:
+    """Of a section so soft in every way that these steps resolve all motions, on a free hub under a smooth torque."""
     extension("radau5")
     soft = {"EA": 20.0, "GA": 20.0, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 0.5}
     torque = {"type": "torque", "hub_inertia": 1.0, "table": [[0.0, 0.0], [1.0, 0.5], [2.0, -0.5]]}
     tables: dict[str, Any] = {
         "structure": {"type": "planar_beam", "length": 1.0, "section": soft},
-        "motion": {"type": "spin_up", "speed": 1.0, "duration": 2.0} if kind == "fixed" else torque,
+        "motion": torque,
         "mesh": {"elements": 1, "degree": 2},
         "solver": {"increment_tolerance": 1e-11},
     }
@@ -239,7 +221,7 @@ def test_outputs_and_terms_of_a_call(extension: Callable[[str], ModuleType]) -> 
     assert np.max(np.abs(done.history["root_M"] - still.history["root_M"])) > 1e-6
 
 
-@pytest.mark.parametrize("name", ["tip_u1", "root_m3", "M", "x"])
+@pytest.mark.parametrize("name", ["tip_u1", "M"])
 def test_output_needs_a_name_of_its_own(extension: Callable[[str], ModuleType], name: str) -> None:
     """Neither a call nor a registered output replaces a column of the history or of the stations."""
     form = extension("root_moment").form
@@ -259,9 +241,12 @@ def test_names_that_a_call_cannot_take(extension: Callable[[str], ModuleType]) -
         rotfem.run(beam(), terms={"internal": lambda m, delta: 0})
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 @pytest.mark.parametrize(
-    "motion", [{"type": "constant", "speed": 0.0}, {"type": "spin_up", "speed": 3.0, "duration": 1.0}]
+    ("motion", "theory"),
+    [
+        ({"type": "constant", "speed": 0.0}, "consistent_linear"),
+        ({"type": "spin_up", "speed": 3.0, "duration": 1.0}, "reissner"),
+    ],
 )
 def test_a_term_without_a_derivative_at_rest_is_refused(motion: dict[str, Any], theory: str) -> None:
     """|v| has none where v = 0: without a spin UFL divides by zero, at the start of one the numbers are not finite."""
@@ -275,7 +260,7 @@ def test_a_term_without_a_derivative_at_rest_is_refused(motion: dict[str, Any], 
 
 
 @pytest.mark.estimated
-@pytest.mark.parametrize("constants", [None, ("w",), ("w", "w")])
+@pytest.mark.parametrize("constants", [None, ("w",)])
 def test_linear_theories_refuse_what_is_no_polynomial_of_the_speed(constants: tuple[str, ...] | None) -> None:
     """Quadratic drag c |v| v: |w| w is odd as w, and 1 at 1 as w and w²; linear drag with a wrong declaration."""
 

@@ -12,8 +12,6 @@ import pytest
 from rotfem import run
 from tests.beams import STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 #: A short spin-up of the unit beam, whose first frequency is 3.5 rad/s, and a hub that is turned forth and back.

@@ -10,6 +10,8 @@ import pytest
 from rotfem import run
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.estimated
+
 
 def released(**time: Any) -> dict[str, Any]:
     """Return the beam let go from 0.2 L at 3 rad/s."""

@@ -7,9 +7,7 @@ from typing import Any
 import pytest
 
 from rotfem import Problem, RunResult, run
-from rotfem.analysis.conditioning import conditioning
-
-pytestmark = pytest.mark.usefixtures("unestimated")
+from rotfem.analysis.equilibrium import conditioning
 
 #: Tip deflection that is asked for, over the length.
 SMALL = 1e-3

@@ -11,6 +11,8 @@ from rotfem import ModesResult, campbell, modes
 from rotfem.accuracy.errors import ASYMPTOTIC
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.estimated
+
 BEAM = {
     "type": "planar_beam",
     "length": 10.0,

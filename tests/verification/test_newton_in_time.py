@@ -11,25 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from rotfem import ComputationError, run
 from rotfem.analysis.equilibrium import static_tip_shape
-from rotfem.analysis.march import check_root
-from rotfem.analysis.schemes import Stage
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
-from rotfem.numerics import forms
 from rotfem.numerics.newton import Newton
 from rotfem.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
-
-#: Places in a cell, between its nodes.
-POINTS = np.array([[0.1], [0.5], [0.8]])
 
 
 def beam(slenderness: float, displacement: float, **changes: Any) -> Scene:
@@ -47,40 +37,14 @@ def beam(slenderness: float, displacement: float, **changes: Any) -> Scene:
     return Scene.from_dict(tables).replace(changes)
 
 
-def elastica(deflection: float) -> tuple[float, float]:
-    """Return (shortening, angle) of the tip of an inextensible cantilever under a dead end force, in L and rad.
-
-    With θ'² = 2k² (sin φ − sin θ), φ the angle of the tip, length and coordinates are integrals over θ; θ = φ − τ²
-    takes the root out of them.
-    """
-
-    def integral(phi: float, f: Any) -> float:
-        def integrand(tau: float) -> float:
-            theta = phi - tau**2
-            rest = np.sin(phi) - np.sin(theta) if tau > 1e-8 else tau**2 * np.cos(phi)
-            return (
-                float(f(theta) * 2 * tau / np.sqrt(2 * rest)) if tau > 0 else float(f(phi) * np.sqrt(2 / np.cos(phi)))
-            )
-
-        return float(quad(integrand, 0.0, np.sqrt(phi), epsabs=1e-12, epsrel=1e-12)[0])
-
-    def relative(phi: float, f: Any) -> float:
-        return integral(phi, f) / integral(phi, lambda theta: 1.0)
-
-    phi = brentq(lambda p: relative(p, np.sin) - deflection, 1e-3, 1.55)
-    return 1.0 - relative(phi, np.cos), float(phi)
-
-
-@pytest.mark.parametrize("slenderness", [1e3, 1e5])
-@pytest.mark.parametrize("deflection", [0.5, 0.8])
-def test_static_shape_is_the_elastica(slenderness: float, deflection: float) -> None:
-    """Shortening and angle of the tip to the stretch that is left, of the order r²/L², and 6 cubic elements' error."""
-    problem = Problem.of(beam(slenderness, deflection))
+@pytest.mark.parametrize(("deflection", "elastica"), [(0.5, (0.16540984, 0.79339193)), (0.8, (0.53368073, 1.40752105))])
+def test_static_shape_is_the_elastica(deflection: float, elastica: tuple[float, float]) -> None:
+    """Shortening and angle of the tip (quadrature) to the stretch that is left, r²/L², and 6 cubic elements' error."""
+    problem = Problem.of(beam(1e5, deflection))
     q = static_tip_shape(problem, deflection * LENGTH, Newton())
     u1, u2, alpha = compile_system(problem).structure.tip_values(q)
-    shortening, angle = elastica(deflection)
     assert u2 == pytest.approx(deflection * LENGTH, rel=1e-9)
-    assert (-u1 / LENGTH, alpha) == pytest.approx((shortening, angle), rel=6e-5)
+    assert (-u1 / LENGTH, alpha) == pytest.approx(elastica, rel=6e-5)
 
 
 def test_a_shape_that_is_not_found_says_how_far_the_tip_came() -> None:
@@ -91,15 +55,7 @@ def test_a_shape_that_is_not_found_says_how_far_the_tip_came() -> None:
         static_tip_shape(Problem.of(beam(1e3, 0.5)), 5.0, Newton(max_iterations=1))
 
 
-def test_a_section_that_no_number_holds_fails_with_a_message() -> None:
-    """GA/EI is beyond round-off by twenty orders: the shape is not found, and that is said."""
-    stiff = beam(1e3, 0.05).replace({"structure.section.GA": 1e37, "mesh.elements": 2, "mesh.degree": 2})
-    with pytest.raises(ComputationError, match="no static shape"):
-        static_tip_shape(Problem.of(stiff), 0.5, Newton())
-
-
-@pytest.mark.parametrize("theory", ["reissner", "second_order", "von_karman"])
-@pytest.mark.parametrize("displacement", [0.05, 0.3])
+@pytest.mark.parametrize(("theory", "displacement"), [("reissner", 0.3), ("second_order", 0.05), ("von_karman", 0.05)])
 def test_slenderness_is_no_matter(theory: str, displacement: float) -> None:
     """Releases in whole steps at any slenderness; the tip follows the same path once the axis cannot stretch.
 
@@ -144,54 +100,3 @@ def test_creep_of_a_beam_that_is_all_viscosity(displacement: float) -> None:
     result = run(beam(450.0, displacement, **{"structure.damping.kelvin_voigt": 10.0}))
     path = result.history["tip_u2"] / (displacement * LENGTH)
     assert path == pytest.approx(np.exp(-result.history["t"] / 10.0), abs=4e-3 if displacement < 0.1 else 8e-3)
-
-
-def test_a_root_that_is_not_the_motions() -> None:
-    """A state turned inside out is refused though it may balance."""
-    system = compile_system(Problem.of(beam(1e3, 0.1)))
-    system.set_time(0.0)
-    zero = system.zeros()
-    check_root(system, Stage(0.02, zero, zero, zero, 1.0, 1.0))
-    inside_out = zero.copy()
-    inside_out[::3] = -2.0 * system.V.tabulate_dof_coordinates()[:, 0]
-    with pytest.raises(ComputationError, match="inside out"):
-        check_root(system, Stage(0.02, inside_out, zero, zero, 1.0, 1.0))
-
-
-def test_a_beam_that_hardly_moves_is_not_inside_out() -> None:
-    """What is sure without compiling is so of 1 + u₁' and turns to 0.4 each, of states at random where it is said."""
-    system = compile_system(Problem.of(beam(1e3, 0.1)))
-    structure, zero, x = system.structure, system.zeros(), system.V.tabulate_dof_coordinates()[:, 0]
-    for part, slope in ((0, -0.05), (1, 0.05), (2, 0.05)):  # of u₁ and u₂ in x, of the turn by the length
-        for factor, sure in ((7.9, True), (9.0, False)):  # the points are not at the tip
-            q = zero.copy()
-            q[part::3] = factor * slope * x / (LENGTH if part == 2 else 1.0)
-            system.set_state(q)
-            assert structure.hardly_moved() == sure
-    random = np.random.default_rng(2)
-    lowest = []
-    for size in np.geomspace(1e-3, 1.0, 60):
-        system.set_state(size * random.standard_normal(zero.size))
-        if structure.hardly_moved():
-            stretch = forms.expression(structure.stretch(system.model.mechanics.strains), POINTS, system.comm)
-            lowest.append(float(stretch.eval(structure.mesh, np.arange(6, dtype=np.int32)).min()))
-    assert len(lowest) > 10
-    assert min(lowest) > 0.4
-
-
-def test_tangent_on_the_way_is_the_tangent_where_nothing_moved() -> None:
-    """With the state itself for the one before, stresses are those of the state."""
-    for moving in (True, False):
-        system = compile_system(Problem.of(beam(1e2, 0.1)), moving=moving)
-        system.set_time(0.0)
-        q = 0.1 * np.random.default_rng(1).standard_normal(system.zeros().size)
-        q[system.clamped] = 0.0
-        system.set_state(q)
-        A = system.tangent(1.0, 0.0, 0.0)[0].copy()
-        B = system.tangent(1.0, 0.0, 0.0, q)[0].copy()
-        C = system.tangent(1.0, 0.0, 0.0, 0.9 * q)[0]
-        norm = A.norm()
-        C.axpy(-1.0, A)
-        B.axpy(-1.0, A)
-        assert B.norm() < 1e-13 * norm
-        assert C.norm() > 1e-6 * norm

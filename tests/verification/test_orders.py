@@ -17,8 +17,6 @@ from scipy.interpolate import BarycentricInterpolator
 
 from rotfem import run
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 #: A thick beam, well deflected: tip u2 = 0.3 L, with shear, stretch and spin all taking part.
@@ -115,20 +113,3 @@ def test_higher_order_in_time(unit_beam: Any, theory: str, frame: str, order: fl
     change = changes_of_history(unit_beam, {"scheme": "esdirk4"}, theory, frame, 4)
     orders = np.log2(change[:-1] / change[1:])
     assert np.all(orders[-1, 1:] > order - 0.25)
-
-
-def test_adaptive_steps_meet_their_tolerance(unit_beam: Any) -> None:
-    """The error at the end falls with the tolerance, and stays below tolerance · L."""
-    exact = run(unit_beam(**UNSTEADY, time={"end": 2.0, "step": 0.0005})).history
-    errors, steps = [], []
-    for tolerance in (1e-2, 1e-3, 1e-4):
-        result = run(unit_beam(**UNSTEADY, time={"end": 2.0, "tolerance": tolerance}))
-        t = result.history["t"]
-        errors.append(abs(result.history["tip_u2"][-1] - exact["tip_u2"][-1]))
-        steps.append(result.summary["steps"])
-        assert t[-1] == 2.0
-        assert np.all(np.diff(t) > 0)
-        assert errors[-1] < tolerance
-    assert errors[2] < errors[1] / 3
-    assert errors[1] < errors[0] / 3
-    assert steps[0] < steps[1] < steps[2]

@@ -9,22 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
-from scipy.special import iv, jv, kv, yv
 
 import rotfem
-from rotfem.analysis.modal import ModalAnalysis
 from rotfem.commands.problem import Problem
 from rotfem.errors import SceneError
-from rotfem.mechanics.theories import ladder
 from rotfem.scene import Scene
 from tests.plate_mesh_files import grid, write_msh
 
 from .conftest import reference_file
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
-THEORIES = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
 E, NU, RHO = 70e9, 0.3, 2700.0
 
 
@@ -55,33 +48,29 @@ def transverse(scene: Scene) -> np.ndarray:
 THIN = np.array([3.4710, 8.5065, 21.285, 27.199, 30.956])
 
 
-@pytest.mark.parametrize("t", [1e-3, 1e-4])
-@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+@pytest.mark.parametrize(("t", "cell"), [(1e-4, "quadrilateral"), (1e-3, "triangle")])
 def test_thin_square_at_rest(t: float, cell: str) -> None:
     """8×8 cells, quadrilaterals of degree 2 or twice as many triangles of degree 3."""
     found = transverse(square(t, mesh__cell=cell))[:5] / unit(t)
     np.testing.assert_allclose(found, THIN, rtol=1e-3)
 
 
-@pytest.mark.parametrize("t", [1e-3, 1e-4])
-def test_thin_square_on_a_distorted_mesh(tmp_path: Path, t: float) -> None:
+def test_thin_square_on_a_distorted_mesh(tmp_path: Path) -> None:
     """Inner nodes of the 8×8 mesh moved by up to 0.2 of a cell each way, from a mesh file."""
     points, groups = grid(8, 8)
     inner = (points[:, 0] > 0) & (points[:, 0] < 1) & (np.abs(points[:, 1]) < 0.5)
     points[inner] += np.random.default_rng(3).uniform(-0.2, 0.2, (inner.sum(), 2)) / 8
     mesh = write_msh(tmp_path / "distorted.msh", points, groups)
-    scene = square(t, structure__length=None, structure__width=None, structure__mesh=str(mesh))
-    found = transverse(scene)[:5] / unit(t)
+    scene = square(1e-4, structure__length=None, structure__width=None, structure__mesh=str(mesh))
+    found = transverse(scene)[:5] / unit(1e-4)
     np.testing.assert_allclose(found, THIN, rtol=1e-3)
 
 
 #: (h/a, spin, δ, γ, with Coriolis force) of the spectral values; at rest there is none of that force.
 SPINNING = [
     (h, spin, 0.0, gamma, coriolis)
-    for coriolis, speeds in ((False, (0.0, 2.0, 10.0)), (True, (2.0, 10.0)))
-    for h in (0.01, 0.1)
-    for spin in ("e3", "e2")
-    for gamma in speeds
+    for coriolis, gamma in ((False, 2.0), (False, 10.0), (True, 10.0))
+    for h, spin in ((0.01, "e3"), (0.1, "e2"))
 ]
 
 
@@ -127,20 +116,18 @@ def test_spinning_square_converges() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cell", "degree", "integration"), [("quadrilateral", 1, "reduced"), ("triangle", 2, "reduced")]
+    ("cell", "degree", "integration"),
+    [("quadrilateral", 1, "reduced"), ("triangle", 2, "reduced"), ("quadrilateral", 2, "full")],
 )
 def test_elements_that_lock_are_refused(cell: str, degree: int, integration: str) -> None:
     with pytest.raises(SceneError, match="lock"):
         square(0.01, mesh__cell=cell, mesh__degree=degree, mesh__integration=integration)
-    with pytest.raises(SceneError, match="lock"):
-        square(0.01, mesh__degree=2, mesh__integration="full")
 
 
 @pytest.mark.parametrize(
     ("mesh", "accuracy"), [({}, 1.5e-3), ({"degree": 3}, 2e-4), ({"cell": "triangle"}, 5e-4)], ids=["Q2", "Q3", "P3"]
 )
-@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
-def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[str, Any], accuracy: float) -> None:
+def test_no_modes_that_reduced_integration_does_not_see(mesh: dict[str, Any], accuracy: float) -> None:
     """A wide cantilever 1 × 4 × 0.1 m: (1 − 3ξ²)(1 − 3η²) had 1527 rad/s. Reference: Legendre–Ritz, Mindlin, 1e-4.
 
     On the 4 × 16 cells of the default Q2 have 1.3e-3 of error in the sixth mode, Q3 and P3 1.1e-4 and 2.9e-4.
@@ -148,7 +135,7 @@ def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[
     scene = square(
         0.1,
         structure__width=4.0,
-        model__theory=theory,
+        model__theory="consistent_linear",
         motion={"type": "constant", "speed": 0.0},
         modes__count=6,
         mesh=mesh,
@@ -157,7 +144,7 @@ def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[
     np.testing.assert_allclose(frequencies, [535.0, 610.1, 824.4, 1169.9, 1668.4, 2335.7], rtol=accuracy)
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_stretch_in_the_plane(theory: str) -> None:
     """A spinning square on a hub: u1 of the tip against Legendre–Ritz 7.38340e-4 (von Kármán linear, 6e-5)."""
     speed = 2.0 * unit(0.05)
@@ -169,12 +156,6 @@ def test_stretch_in_the_plane(theory: str) -> None:
     )
     wanted = 7.38340e-4
     assert rotfem.run(scene).summary["figures"]["tip_u1_final"] == pytest.approx(wanted, rel=3e-3)
-
-
-def test_many_modes_of_a_thick_plate() -> None:
-    """Forty pairs to a backward error far below what is accepted: the eigensolver counts in a fitting unit of time."""
-    scene = square(0.3, model__theory="consistent_linear", motion={"type": "constant", "speed": 0.0}, modes__count=40)
-    assert max(row["residual"] for row in rotfem.modes(scene).rows) < 1e-11
 
 
 # --- strips are beams ------------------------------------------------------------------------------------------------
@@ -198,13 +179,9 @@ def strip(**changes: Any) -> Scene:
 @pytest.mark.parametrize(
     ("theory", "history", "frequency"),
     [
-        # Plate and beam have the same equations but for strains of second order: von Kármán's ½ u_3'² against the
-        # stretch of the axis, Green's strain against Reissner's. Frequencies: mesh of the strip.
-        ("linear", 1e-5, 1e-3),
+        # Plate and beam have the same equations but for Green's strain against Reissner's. Frequencies: mesh.
         ("consistent_linear", 1e-5, 1e-3),
-        ("von_karman_linear", 1e-5, 1e-3),
         ("second_order", 1e-5, 1e-3),
-        ("von_karman", 3e-3, 1e-3),
         ("reissner", 1e-4, 1e-3),
     ],
 )
@@ -216,8 +193,6 @@ def test_strip_is_a_beam(spin_up: Any, theory: str, history: float, frequency: f
     assert scale > 0.3
     np.testing.assert_allclose(plate["tip_u3"], beam["tip_u2"], rtol=0, atol=history * scale)
     np.testing.assert_allclose(plate["tip_alpha1"], beam["tip_alpha"], rtol=0, atol=3 * history * scale)
-    if theory == "linear":
-        return
     for speed in (3.0, 12.0):
         turning = {"type": "constant", "speed": speed}
         rows = rotfem.modes(spin_up({"model.theory": theory}, motion=turning)).rows
@@ -345,8 +320,9 @@ def test_end_shear() -> None:
     assert tip["tip_u3"][-1] == pytest.approx(beam["tip_u2"][-1], rel=1e-4)
 
 
-@pytest.mark.parametrize("kind", ["dead", "follower"])
-@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "reissner"])
+@pytest.mark.parametrize(
+    ("theory", "kind"), [("consistent_linear", "dead"), ("reissner", "dead"), ("reissner", "follower")]
+)
 def test_couple_in_the_plane(theory: str, kind: str) -> None:
     """A strip bent in its plane by a moment at its tip: u2 = M L²/2EI in first order.
 
@@ -359,7 +335,7 @@ def test_couple_in_the_plane(theory: str, kind: str) -> None:
         loads__tip_moment={"value": [0, 0, moment], "kind": kind}, model__theory=theory, mesh__elements=[16, 2]
     )
     figures = rotfem.run(scene).summary["figures"]
-    accuracy = {"linear": 1e-9, "consistent_linear": 1e-5, "reissner": 6e-5}[theory]
+    accuracy = {"consistent_linear": 1e-5, "reissner": 6e-5}[theory]
     assert figures["tip_u2_final"] == pytest.approx(moment * 10.0**2 / (2 * EI), rel=accuracy)
     assert abs(figures["tip_u3_final"]) < 1e-9
 
@@ -367,7 +343,7 @@ def test_couple_in_the_plane(theory: str, kind: str) -> None:
 # --- theorems --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", "second_order", "von_karman", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_jacobi_integral(theory: str) -> None:
     """Constant spin about a skew axis, ρ∞ = 1: T2 − T0 + W is kept to the error of the steps, which falls with h²."""
     drift = []
@@ -390,7 +366,7 @@ def test_jacobi_integral(theory: str) -> None:
     assert drift[0] / drift[1] == pytest.approx(4.0, rel=0.1)  # the next term is of relative size h, not yet nothing
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_symmetries_and_tangents(theory: str) -> None:
     """M and K symmetric, C skew about the steady state, tangents against differences of the residual."""
     motion = {"type": "constant", "speed": 40.0, "axis": [0.3, -0.4, 1.0]}
@@ -404,24 +380,7 @@ def test_symmetries_and_tangents(theory: str) -> None:
         assert checks["linearisation"] < 1e-8
 
 
-def test_exact_theory_contains_the_linear_one() -> None:
-    """At rest, where there is no prestress, all theories have the same tangent at the undeformed state."""
-    found = [transverse(square(0.02, model__theory=theory, mesh__elements=[4, 4])) for theory in THEORIES]
-    for other in found[1:]:
-        np.testing.assert_allclose(other[:5], found[0][:5], rtol=1e-9)
-
-
-def test_gravity_is_an_upward_acceleration_of_the_hub() -> None:
-    fields = {}
-    for key, value in (("loads__gravity", [0, 0, -9.81]), ("motion__base_acceleration", [0, 0, 9.81])):
-        fields[key] = rotfem.run(square(0.01, model__theory="reissner", mesh__elements=[3, 3], **{key: value})).history
-    a, b = fields.values()
-    assert a["tip_u3"][-1] < -1e-4
-    assert a["tip_u3"][-1] == pytest.approx(b["tip_u3"][-1], rel=1e-10)
-
-
-@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
-def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_factor_kept_over_steps_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps with an old factor against steps with their own: the same history to the tolerance, spin-up and after.
 
     150 steps that are left off by 1e-12 of the length are off by 1.5e-8 of the displacement if all add up.
@@ -430,7 +389,7 @@ def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pyte
 
     scene = square(
         0.05,
-        model__theory=theory,
+        model__theory="reissner",
         mesh__elements=[4, 4],
         motion={"type": "spin_up", "speed": 30.0, "duration": 0.1, "axis": [0, 1, 0]},
         time={"end": 0.15, "step": 1e-3},
@@ -462,7 +421,7 @@ def test_reduced_basis(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(row["residual"] for row in quick.rows) < 1e-6
 
 
-@pytest.mark.parametrize("theory", [theory for theory in ladder() if theory != "linear"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_modes_in_the_plane_are_those_of_the_beam(theory: str) -> None:
     """A strip that spins about its normal three times as fast as it flaps first: the planar beam of its section.
 
@@ -504,11 +463,6 @@ def test_tip_is_the_middle_of_its_edge(tmp_path: Path) -> None:
         assert read == pytest.approx(np.ones(structure.size), abs=1e-12)
 
 
-def test_analysis_keeps_its_space() -> None:
-    analysis = ModalAnalysis(Problem.of(square(0.01, mesh__elements=[2, 2])))
-    assert analysis.system.V.dofmap.index_map_bs == 5
-
-
 # --- a disk ----------------------------------------------------------------------------------------------------------
 
 
@@ -528,37 +482,9 @@ def disk_mesh(path: Path, inner: float, outer: float, around: int, across: int) 
     return write_msh(path, points, {"plate": cells, "clamped": edge})
 
 
-def annulus(m: int, ratio: float) -> float:
-    """Return k·outer of the first mode with m diameters, clamped inside, free outside, Kirchhoff's plate (Leissa 1969).
-
-    w = A J + B Y + C I + D K of order m at k r: w = w' = 0 inside, moment and Kirchhoff shear 0 outside.
-    """
-
-    def column(f: Any, sign: float, k: float) -> list[float]:
-        step = 1e-3
-
-        def derivatives(r: float) -> tuple[float, float, float, float]:
-            x = [f(m, k * (r + i * step)) for i in range(-3, 4)]
-            first = (x[6] - 9 * x[5] + 45 * x[4] - 45 * x[2] + 9 * x[1] - x[0]) / (60 * step)
-            return x[3], first, sign, 0.0
-
-        w_in, d_in = derivatives(ratio)[:2]
-        w, d = derivatives(1.0)[:2]
-        laplacian = sign * k**2 * w  # ∇²w
-        d_laplacian = sign * k**2 * d
-        second = laplacian - d + m**2 * w  # w'' at r = 1
-        moment = second + NU * (d - m**2 * w)
-        shear = d_laplacian - (1 - NU) * m**2 * (d - w)
-        return [w_in, d_in, moment, shear]
-
-    def determinant(k: float) -> float:
-        columns = [column(f, s, k) for f, s in ((jv, -1.0), (yv, -1.0), (iv, 1.0), (kv, 1.0))]
-        return float(np.linalg.det(np.array([np.array(c) / np.max(np.abs(c)) for c in columns]).T))
-
-    k = np.linspace(1.0, 6.0, 251)
-    values = [determinant(x) for x in k]
-    i = next(i for i in range(len(k) - 1) if values[i] * values[i + 1] < 0)
-    return float(brentq(determinant, k[i], k[i + 1]))
+#: (k·outer)² of the first mode with 0 to 3 diameters, clamped at a third of the radius, free outside: the zero of the
+#: determinant of the four Bessel functions of Kirchhoff's plate (Leissa 1969).
+ANNULUS = (7.3235205, 7.2877849, 8.6574635, 13.6910371)
 
 
 def test_annular_disk(tmp_path: Path) -> None:
@@ -581,7 +507,7 @@ def test_annular_disk(tmp_path: Path) -> None:
         pair = np.array(fine[name])
         assert len(pair) == (1 if m == 0 else 2)
         extrapolated = pair + (pair - np.array(coarse[name])) / 3
-        np.testing.assert_allclose(extrapolated, annulus(m, inner / outer) ** 2, rtol=1e-3)
+        np.testing.assert_allclose(extrapolated, ANNULUS[m], rtol=1e-3)
         assert max(pair) / min(pair) - 1 < 1e-6
 
 
@@ -610,21 +536,3 @@ def test_travelling_waves(tmp_path: Path) -> None:
         # The Coriolis force on the directors couples the angles against the spin: ω₋ > ω₊.
         assert a["frequency_fixed"][-1] == pytest.approx(low + m * 6000.0, rel=1e-3)
         assert b["frequency_fixed"][-1] == pytest.approx(abs(high - m * 6000.0), abs=1e-3 * high)
-
-
-def test_reduced_basis_with_double_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A disk's pairs of modes in a basis of modes."""
-    mesh = disk_mesh(tmp_path / "disk.msh", 0.1, 0.3, 24, 3)
-    shape = {"structure__length": None, "structure__width": None, "structure__mesh": str(mesh)}
-    scene = square(1e-3, **shape, modes__count=7, model__theory="consistent_linear")
-    speeds = [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
-    quick = rotfem.campbell(scene, speeds, orders=1)
-    monkeypatch.setattr("rotfem.analysis.reduced_basis.MANY", len(speeds) + 1)
-    full = rotfem.campbell(scene, speeds, orders=1)
-    assert quick.summary["reduced_basis"]["checks"][-1]["difference"] < 1e-6
-    assert max(row["residual"] for row in quick.rows) < 1e-6
-    # At rest the modes of a pair are any combination of two, at speed these travelling waves: no reason to be unsure.
-    assert min(b["confidence"] for b in quick.summary["branches"] + full.summary["branches"]) > 0.99
-    assert full.summary["ambiguous"] == quick.summary["ambiguous"] == []
-    for name, branch in full.branches().items():
-        np.testing.assert_allclose(quick.branches()[name]["frequency"], branch["frequency"], rtol=1e-4)

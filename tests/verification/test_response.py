@@ -14,6 +14,8 @@ from rotfem.analysis.state_space import write_matrices
 from rotfem.commands.response import BEND, NARROW, resolved, response
 from tests.beams import STRUCTURE
 
+pytestmark = pytest.mark.estimated
+
 #: Damping ratios of some per cent at the first modes, so that what a start leaves dies away soon.
 LENGTH, SECTION = STRUCTURE["length"], STRUCTURE["section"]
 LOAD = {"harmonic": {"amplitude": [0.0, 2.0], "frequency": 1.0, "phase": 0.3}}

@@ -31,7 +31,7 @@ BALANCES = {
 #: Schemes, and how far what they end in is off: Newton's last increment, 1e-9 times EA; two of them times 1/h.
 DIGITS = {"generalised_alpha": 1e-10, "newmark": 1e-10, "energy_conserving": 1e-10, "esdirk4": 1e-5}
 #: Damping that stresses carry, and that the hub takes up.
-LAST = ("generalised_alpha", "energy_conserving")
+LAST = ("generalised_alpha",)
 DAMPING: dict[str, Any] = {"none": {}, "rayleigh": {"rayleigh": [0.8, 2e-3]}, "modal": {"modal": [0.02, 0.03, 0.05]}}
 
 
@@ -81,18 +81,6 @@ def test_spinning_rod() -> None:
     assert root["root_f2"] == pytest.approx(0.0, abs=1e-9 * abs(root["root_f1"]))
 
 
-@pytest.mark.parametrize("damping", ["rayleigh", "modal"])
-def test_damping_takes_nothing_from_the_force_at_the_root(damping: str) -> None:
-    # Balance of momentum in the linear theory, whose loads are dead: to round-off of EA/EI · L² = 2e5.
-    loads = {"tip_force": [0.0, 3.0]}
-    scene = {**SCENE, "loads": loads, "model": {"theory": "consistent_linear"}, "time": {"end": 0.4, "step": 0.02}}
-    scene["structure"] = {**BEAM, "damping": DAMPING[damping]}
-    history = rotfem.run(scene, outputs={f"b_{n}": BALANCES[n] for n in ("root_f1", "root_f2")}).history
-    for name in ("root_f1", "root_f2"):
-        root, whole = history[name], history[f"b_{name}"]
-        assert np.max(np.abs(root - whole)) < 1e-9 * np.max(np.abs(root)), name
-
-
 @pytest.mark.parametrize("theory", ["linear", "consistent_linear", "second_order", "reissner"])
 def test_the_equation_of_a_free_hub(theory: str) -> None:
     # I ψ'' + c ψ' + (moment about the axis) = M(t) at every step, to Newton's last increment; over a torque pulse.
@@ -106,20 +94,6 @@ def test_the_equation_of_a_free_hub(theory: str) -> None:
         if torque is not None:  # at its jump the state is that before, the torque that after it
             assert 100.0 * state.a[-1] + 0.3 * state.v[-1] + about_axis == pytest.approx(torque, abs=1e-6 * 150.0)
         assert moment.t < 0.2 or abs(about_axis) > 0.0
-
-
-def test_axes_are_those_of_the_hub() -> None:
-    # The same motion seen from the inertial frame: where the beam turns at constant speed in equilibrium, force and
-    # moment of the clamp are constant in the axes of the hub, and those of the steady state in the rotating frame.
-    steady = {"initial": {"state": "steady"}, "motion": {"type": "constant", "speed": 3.0}}
-    load = {"tip_force": {"value": [0.0, 3.0], "kind": "follower"}}
-    time = {"end": 0.1, "step": 5e-4}  # quarter of a turn: errors of the steps, of second order, are left
-    scene = {**SCENE, **steady, "loads": load}
-    turning = rotfem.run({**SCENE, "motion": steady["motion"], "loads": load}).summary["root"]
-    h = rotfem.run({**scene, "model": {"frame": "inertial"}, "time": time}).history
-    for name in BALANCES:
-        scale = 100.0 if name == "root_m3" else 500.0
-        np.testing.assert_allclose(h[name], turning[name], atol=1e-4 * scale)
 
 
 def test_spatial_beam_and_plate_at_rest() -> None:

@@ -12,7 +12,7 @@ from scipy.linalg import eig
 import rotfem
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
-from rotfem.structures.symmetry import inactive_unknowns
+from rotfem.mechanics.problem import inactive_unknowns
 from tests.figures import check
 
 pytestmark = pytest.mark.usefixtures("unestimated")

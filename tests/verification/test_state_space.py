@@ -18,8 +18,6 @@ from scipy.sparse import load_npz
 from rotfem import ComputationError, OutputError, modes, run
 from rotfem.analysis.state_space import state_space, write_matrices
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 SPINNING = {"structure.hub_radius": 1.0, "motion": {"type": "constant", "speed": 6.0}, "modes.count": 6}
@@ -29,9 +27,7 @@ OUTPUTS = ("tip_u1", "tip_u2", "tip_alpha")
 @pytest.mark.parametrize(
     ("theory", "viscosity", "given", "seen"),
     [
-        ("reissner", 1e-3, "tip_force_2", {"tip_u2": 1.5e-3, "tip_alpha": 5e-3}),
-        ("reissner", 0.0, "tip_force_2", {"tip_u2": 1.5e-3}),
-        ("consistent_linear", 1e-3, "tip_force_2", {"tip_u2": 1.5e-3}),
+        ("consistent_linear", 0.0, "tip_force_2", {"tip_u2": 1.5e-3, "tip_alpha": 5e-3}),
         ("reissner", 1e-3, "tip_moment", {"tip_u2": 5e-3}),
     ],
 )

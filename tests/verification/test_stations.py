@@ -13,8 +13,6 @@ import rotfem
 from rotfem.results.files import read_csv
 from tests.beams import SPIN_UP, STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 #: M (N·m) along the Reissner beam in its spin-up, computed without finite elements (see the README.md there).
 REFERENCE = Path(__file__).resolve().parents[1] / "reference" / "spin_up_moment.csv"
 PLACES = [0.0, 0.7, 2.5, 5.3, 9.1, 10.0]
@@ -165,31 +163,6 @@ def test_a_spatial_beam_in_a_plane_is_a_planar_one() -> None:
 def test_refused(output: dict[str, Any], key: str) -> None:
     with pytest.raises(rotfem.SceneError, match=key):
         rotfem.Scene.from_dict({**SPIN_UP, "output": output})
-
-
-def test_a_run_that_fails_before_its_first_row_says_so(tmp_path: Path) -> None:
-    # A hinge that nothing holds has no equilibrium under a follower to start from, and so no station has a row.
-    scene = {
-        "structure": {**STRUCTURE, "root": {"lag_stiffness": 0.0}},
-        "motion": STILL,
-        "loads": {"tip_force": {"value": [0.0, 3.0], "kind": "follower"}},
-        "mesh": {"elements": 2},
-        "time": {"end": 0.1, "step": 0.05},
-        "output": {"stations": 3},
-    }
-    with pytest.raises(rotfem.ComputationError, match="no equilibrium to start from"):
-        rotfem.run(scene, folder=tmp_path)
-    assert (tmp_path / "summary.json").exists()
-
-
-def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
-    scene = {**SPIN_UP, "time": {"end": 0.4, "step": 0.02}, "output": {"stations": 3, "every": 3, "error": False}}
-    whole = rotfem.run(scene)
-    rotfem.run({**scene, "time": {"end": 0.2, "step": 0.02}}, folder=tmp_path, checkpoint=4)
-    resumed = rotfem.run(scene, folder=tmp_path, resume=True)
-    assert whole.stations is not None
-    assert resumed.stations is not None
-    assert resumed.stations.columns.csv() == whole.stations.columns.csv()
 
 
 HUB = {"type": "torque", "hub_inertia": 20.0, "pulses": [[0.0, 0.3, 10.0]]}

@@ -12,8 +12,6 @@ import pytest
 from rotfem import run
 from tests.beams import STRUCTURE
 
-pytestmark = pytest.mark.usefixtures("unestimated")
-
 Array = npt.NDArray[np.float64]
 
 #: Knots that no step of the tests ends at.
@@ -38,10 +36,8 @@ SCHEMES: dict[str, dict[str, Any]] = {
 }
 
 
-#: All data by one scheme, and one of the clamp and one of the hub by all.
-KINKS = [(data, "rho 0.8") for data in DATA] + [
-    (data, s) for data in ("speeds", "torque") for s in ("rho 0", "newmark")
-]
+#: All data by one scheme, and one of the clamp and one of the hub by another.
+KINKS = [(data, "rho 0.8") for data in DATA] + [("speeds", "newmark"), ("torque", "rho 0")]
 
 
 @pytest.mark.parametrize(("data", "scheme"), KINKS)
@@ -97,7 +93,7 @@ def test_stop_within_a_step(start: float) -> None:
     np.testing.assert_allclose(tops[1:], tops[0], rtol=2e-3)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_blow_on_the_tip_whatever_the_damping(rho: float) -> None:
     """0.2 N·s on the tip within 0.4 ms, steps of 2 ms: ρ∞ decides on waves that steps do not resolve, not on the swing.
 
@@ -107,12 +103,6 @@ def test_blow_on_the_tip_whatever_the_damping(rho: float) -> None:
     scene = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 0.0}, "loads": {"tip_force": rows}}
     scene |= {"model": {"theory": "consistent_linear"}, "time": {"end": 2.0, "step": 0.002, "spectral_radius": rho}}
     assert np.abs(run(scene).history["tip_u2"]).max() == pytest.approx(0.0207, rel=0.03)
-
-
-def test_smooth_stop_within_a_step() -> None:
-    """The same stop in 1 ms through a monotone cubic, whose rate is zero at both of its knots: the same swing."""
-    rows = speeds((0.0, 0.2), (1.0033, 0.2), (1.0043, 0.0), (3.0, 0.0)) | {"interpolation": "pchip"}
-    assert np.abs(krb(rows, 0.01, 2.2).history["tip_u2"]).max() == pytest.approx(0.6086, rel=1e-2)
 
 
 def hub(pulses: list[list[float]], step: float, end: float = 2.0) -> Any:
@@ -131,7 +121,7 @@ def test_every_pulse_gives_its_impulse(step: float) -> None:
     assert history["impulse"][-1] == pytest.approx(50.0 * len(ends), rel=1e-10)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.3, 0.8, 1.0])
+@pytest.mark.parametrize("rho", [0.0, 1.0])
 def test_short_ramps_give_their_impulse(rho: float) -> None:
     """Up and down within a step, or over several: H = ∫ M dt for every ρ∞.
 
@@ -159,17 +149,6 @@ def test_pulses_denser_than_steps() -> None:
     assert result.history["psi_dot"][-1] * inertia == pytest.approx(12.0, rel=1e-6)
     assert result.summary["steps"] == 40
     assert result.summary["factorisations"] < 200
-
-
-def test_load_pulse_shorter_than_a_step() -> None:
-    """4 ms of load between two steps of 10 ms: its swing is that of steps of 1 ms but for the third mode's share."""
-    table = [[0.0, 0.0, 0.0], [0.502, 0.0, 0.0], [0.504, 0.0, 5.0], [0.506, 0.0, 0.0]]
-    swings = []
-    for step in (0.01, 0.001):
-        history = krb(SPIN, step, 1.5, loads={"distributed": {"table": table}}).history
-        swings.append(np.interp(np.arange(0.0, 1.5, 0.05), history["t"], history["tip_u2"]))
-    coarse, fine = swings
-    assert np.abs(coarse - fine).max() < 5e-2 * np.abs(fine).max()
 
 
 def test_dense_noise_is_averaged() -> None:

@@ -56,8 +56,6 @@ class Deck:
             content = read_bytes(path)
         except Unreadable as error:
             raise problem("section.from", shown(path), f"cannot be read: {error}") from None
-        if b"\0" in content:
-            raise problem("section.from", shown(path), "cannot be read: it is no text")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:

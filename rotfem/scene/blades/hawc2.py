@@ -17,8 +17,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -73,20 +72,19 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
     if wanted is not None and not isinstance(wanted, str):
         raise problem("section.body", wanted, "must be the name of a main body")
     body = _main_body(deck, wanted)
-    kind = body.command("type")
+    kind = _the(body, "type")
     if kind.words[1].lower() != "timoschenko":
         kind.fail(f"the type {kind.words[1]} is not known; known: timoschenko", 2)
-    if (extra := body.find("concentrated_mass")) is not None:
+    for extra in _all(body, "concentrated_mass"):
         extra.fail("concentrated_mass is not read; take it out and give structure.masses in the scene")
     rows, head = _c2_def(body)
     points = np.array(rows)
     line, through, at = line_of((points[:, :3] - points[0, :3]) @ FROM_HAWC2.T)
     if len(at) != len(line):
         head.fail("two points of c2_def are the same")
-    beam = body.block("timoschenko_input")
-    which, full = beam.command("set"), beam.find("fpm")
-    st = _named_file(beam.command("filename"), deck)
-    table = _table(st, [which.number(2), which.number(3)], None if full is None else bool(full.number(2)))
+    which, full = _the(body, "set"), _all(body, "fpm")
+    st = _named_file(_the(body, "filename"), deck)
+    table = _table(st, [which.number(2), which.number(3)], bool(full[-1].number(2)) if full else None)
     if abs(table["r"][-1] / through.length - 1.0) > 1e-2:  # r often counts along a straight axis
         which.fail(f"its sections end at r = {table['r'][-1]:g} m, and the line of c2_def at {through.length:g} m")
     if abs(table["r"][-1] / through.length - 1.0) > DIGITS:
@@ -95,8 +93,8 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
             f"{through.length:g} m: the last section holds up to there"
         )
     for name in ("damping", "damping_posdef", "damping_aniso"):
-        if body.find(name) is not None:
-            asked.leaves_out(deck, f"{name} of {body.command('name').words[1]}", "structure.damping")
+        if _all(body, name):
+            asked.leaves_out(deck, f"{name} of {_the(body, 'name').words[1]}", "structure.damping")
     section = _section(_up_to(table, through.length))
     return {"line": line, "pretwist": rows_over(at, np.radians(points[:, 3])), "section": section}
 
@@ -204,17 +202,15 @@ def _matrices(table: dict[str, Array]) -> dict[str, Array]:
     return {"stiffness": about_reference(K, elastic, elastic, angle), "mass": mass}
 
 
-# --- main bodies of an htc file ---------------------------------------------------------------------------------
+# --- main bodies of an htc file ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Command:
-    """The words of a line, where it stands, and of `begin NAME` the commands before its end."""
+class Command(NamedTuple):
+    """The words of a line, and where it stands."""
 
     deck: Deck
     line: int
     words: list[str]
-    inner: list[Command] = field(default_factory=list)
 
     def fail(self, reason: str, column: int | None = None) -> NoReturn:
         """Refuse the file here."""
@@ -226,35 +222,6 @@ class Command:
             self.fail(f"has {len(self.words)} columns; {self.words[0]} has a number in column {column}")
         return self.deck.value(self.words[column - 1], self.line, column)
 
-    @property
-    def name(self) -> str:
-        """What `begin` says."""
-        return self.words[1].lower() if len(self.words) > 1 else ""
-
-    def all(self, name: str) -> list[Command]:
-        """Return the inner commands of a name."""
-        return [each for each in self.inner if each.words[0].lower() == name]
-
-    def find(self, name: str) -> Command | None:
-        """Return the last inner command of a name; None if there is none."""
-        return next(reversed(self.all(name)), None)
-
-    def command(self, name: str) -> Command:
-        """Return an inner command that must be there, with something behind its name."""
-        found = self.find(name)
-        if found is None:
-            self.fail(f"begin {self.name} has no {name}")
-        if len(found.words) < 2:
-            found.fail(f"{name} has nothing behind it")
-        return found
-
-    def block(self, name: str) -> Command:
-        """Return an inner `begin NAME` that must be there."""
-        found = next((each for each in self.all("begin") if each.name == name), None)
-        if found is None:
-            self.fail(f"begin {self.name} has no begin {name}")
-        return found
-
 
 def _is_htc(deck: Deck) -> bool:
     """Return whether there is a main body, or another file that may have one."""
@@ -262,9 +229,21 @@ def _is_htc(deck: Deck) -> bool:
     return any(each[:2] == ["begin", "main_body"] or each[:1] == ["continue_in_file"] for each in words)
 
 
-def _main_body(deck: Deck, wanted: str | None) -> Command:
-    """Return a main body by its name, or the only one there is; a copy is the body that it copies."""
-    bodies = {block.command("name").words[1]: block for block in _main_bodies(deck)}
+def _all(body: list[Command], name: str) -> list[Command]:
+    return [each for each in body if each.words[0].lower() == name]
+
+
+def _the(body: list[Command], name: str) -> Command:
+    """Return the last command of a name, which must be there, with something behind it; its `begin` is the first."""
+    found = _all(body, name)
+    if not found or len(found[-1].words) < 2:
+        (found or body)[-1 if found else 0].fail(f"the main body has no {name} with something behind it")
+    return found[-1]
+
+
+def _main_body(deck: Deck, wanted: str | None) -> list[Command]:
+    """Return the commands of a main body by its name, or of the only one; a copy is the body that it copies."""
+    bodies = _main_bodies(deck)
     allowed = ", ".join(show(name) for name in bodies)
     if not bodies:
         deck.fail("has no begin main_body")
@@ -274,66 +253,58 @@ def _main_body(deck: Deck, wanted: str | None) -> Command:
     for _ in bodies:
         if name not in bodies:
             raise problem("section.body", name, f"is not in {deck.path.name}; allowed: {allowed}")
-        copied = bodies[name].find("copy_main_body")
-        if copied is None:
+        if not _all(bodies[name], "copy_main_body"):
             return bodies[name]
-        name = copied.words[1] if len(copied.words) > 1 else ""
-    bodies[name].fail("main bodies copy each other in a circle")
+        name = _the(bodies[name], "copy_main_body").words[1]
+    bodies[name][0].fail("main bodies copy each other in a circle")
 
 
-def _c2_def(body: Command) -> tuple[list[list[float]], Command]:
+def _main_bodies(deck: Deck) -> dict[str, list[Command]]:
+    """Return name ↦ commands, `begin` first, of the main bodies of a file and of those in which it continues."""
+    bodies: dict[str, list[Command]] = {}
+    begins: list[Command] = []
+    body: list[Command] = []
+    for command in _commands(deck, deck, DEEPEST):
+        word, *behind = (word.lower() for word in command.words)
+        main = word == "begin" and behind[:1] == ["main_body"]
+        body = [command] if main else [*body, command]
+        if word == "begin":
+            begins.append(command)
+        elif word == "end":
+            if not begins:
+                command.fail("an end without a begin")
+            if begins.pop() is body[0]:
+                bodies[_the(body, "name").words[1]] = body
+    if begins:
+        begins[-1].fail(f"{' '.join(begins[-1].words)} has no end")
+    return bodies
+
+
+def _c2_def(body: list[Command]) -> tuple[list[list[float]], Command]:
     """Return rows (x, y, z in m, twist in degrees) of a body's line, and the command that says how many there are."""
-    block = body.block("c2_def")
-    head = block.command("nsec")
+    head, sections = _the(body, "nsec"), _all(body, "sec")
     count = int(head.number(2))
-    sections = block.all("sec")
     if count < 2 or len(sections) != count:
         head.fail(f"nsec is {count}, at least 2, and there are {len(sections)} lines of sec", 2)
     for number, section in enumerate(sections, start=1):
-        if section.number(2) != number:
-            section.fail(f"must be section {number}, not {section.words[1]}", 2)
-        if len(section.words) != 6:
-            section.fail(f"has {len(section.words)} columns; must be sec, its number, x, y, z and twist")
+        if len(section.words) != 6 or section.number(2) != number:
+            section.fail(f"must be sec, its number, {number}, x, y, z and twist: 6 columns, not {len(section.words)}")
     return [[section.number(column) for column in range(3, 7)] for section in sections], head
-
-
-def _main_bodies(deck: Deck) -> list[Command]:
-    """Return all main bodies of a file and of those in which it continues."""
-    found: list[Command] = []
-    stack: list[Command] = []
-    for command in _commands(deck, deck, DEEPEST):
-        word = command.words[0].lower()
-        if stack and word != "end":
-            stack[-1].inner.append(command)
-        if word == "begin":
-            stack.append(command)
-        elif word == "end":
-            if not stack:
-                command.fail("an end without a begin")
-            if (closed := stack.pop()).name == "main_body":
-                found.append(closed)
-    if stack:
-        stack[-1].fail(f"begin {stack[-1].name} has no end")
-    return found
 
 
 def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
     """Yield the commands of a file, with those of files in which it continues in their places."""
     for line, text in enumerate(deck.lines, start=1):
-        words = text.split(";")[0].split()
-        if not words:
+        if not (words := text.split(";")[0].split()):
             continue
-        command = Command(deck, line, words)
-        word = words[0].lower()
+        command, word = Command(deck, line, words), words[0].lower()
         if word == "exit":
             return
         if word != "continue_in_file":
             yield command
-        elif depth == 0:
-            command.fail(f"continues in more than {DEEPEST} files, one in the other")
+        elif depth == 0 or len(words) < 2:
+            command.fail(f"must name another file; at most {DEEPEST} continue, one in the other")
         else:
-            if len(words) < 2:
-                command.fail("continue_in_file has nothing behind it")
             yield from _commands(_named_file(command, main), main, depth - 1)
 
 

@@ -10,7 +10,8 @@ from tests.hard.case import Case
 
 LENGTH, EI = 10.0, 1.4e4
 
-#: Times (s), and u2 of the tip (m) by its displacement at the start: `tests/hard/references/link_chain.py`.
+#: Times (s), and u2 of the tip (m) by its displacement at the start: 16 and 32 rigid links with springs,
+#: inextensible and unshearable, by DOP853 to 1e-8, extrapolated in the number of links.
 TIMES = (0.5, 1.0, 1.5, 2.0)
 RELEASED = {
     0.1: (-0.02951746, -0.07656813, 0.08019088, 0.02258742),

@@ -1,0 +1,180 @@
+"""The equation of a free hub, whose angle psi is one more unknown (Yigit, Scott & Ulsoy 1988).
+
+It is the virtual work of all effects in a rigid turn δx = e×x δpsi about the axis e,
+
+    I_R psi'' + c psi' + (work in the turn) = M(t),
+
+which is the balance of angular momentum of hub and structure, exactly and for every theory.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.analysis import extract_constants
+
+from rotfem.equations.model import Model
+from rotfem.mechanics import work
+from rotfem.numerics import compat, forms
+from rotfem.numerics.forms import added, assembled, weighted
+from rotfem.numerics.projection import summed
+
+Array = npt.NDArray[np.float64]
+
+
+class BySpin:
+    """The column of a free hub's angle in the tangent: c_v ∂/∂Omega + c_m ∂/∂Omega' of a form.
+
+    The speed along the axis of the motion is varied.
+
+    Attributes:
+        constants: in it: the factors c_v and c_m, and the variation of the speed, 0.
+    """
+
+    def __init__(self, model: Model, form: Any):
+        self.constants = [model.structure.constant(0.0) for _ in range(3)]
+        self._model, self._form = model, form
+
+    @cached_property
+    def ufl(self) -> Any:
+        """The derivative, a UFL form; None if the speed is not in the form."""
+        model, parts, expanded = self._model, [], expand_derivatives(self._form)
+        *factors, zero = self.constants
+        for name, factor in zip(("w", "dw"), factors, strict=True):
+            constant = model.frame.constants.get(name)
+            if constant is None:
+                continue
+            within = [part for part in expanded.integrals() if constant in extract_constants(part.integrand())]
+            s = ufl.variable(zero)
+            axis = model.motion.axis[-constant.value.size :]
+            shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
+            derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
+            if not derivative.empty():
+                parts.append(factor * derivative)
+        return added(parts) if parts else None
+
+    def set(self, c_v: float, c_m: float) -> None:
+        """Set the factors."""
+        for constant, value in zip(self.constants, (c_v, c_m), strict=False):
+            constant.value = value
+
+
+class HubRow:
+    """The hub's equation and its derivatives at the state in the functions of a model.
+
+    Args:
+        model: the terms, with a free hub.
+        clamped: numbers of the clamped unknowns.
+        once: whether its forms are compiled without optimisation (see `rotfem.numerics.forms`).
+
+    Attributes:
+        angle: psi and its rates, and the motion of the frame that they make.
+        hub: inertia, torque, brake.
+        coupled: whether it feels the elastic motion; else its work is that of the undeformed structure at rest.
+    """
+
+    def __init__(self, model: Model, clamped: Any, once: bool):
+        assert model.hub is not None
+        self.model, self.angle, self.hub, self._clamped = model, model.hub, model.hub.hub, clamped
+        self.coupled = "hub_coupling" in model.effects
+        moments = model.work(model.turn)
+        moment, self._shifts = added(moments.values()), [model.structure.constant(0.0) for _ in range(3)]
+        self._by_spin = BySpin(model, moment)
+        *state, dq = model.structure.k.functions
+        self._state = [x.x.array for x in state]
+
+        def make() -> dict[str, Any]:
+            outside = [term for name, term in moments.items() if not model.acting[name].momentum]
+            wanted = {
+                "moment": moment,
+                "spin": self._by_spin.ufl,
+                "row": weighted(self._shifts, (ufl.derivative(moment, x, dq) for x in state)) if self.coupled else None,
+                "outside": added(outside) if outside else None,
+            }
+            return {name: form for name, form in wanted.items() if form is not None}
+
+        purpose, more = f"hub {model.motion.axis} {model.effects}", (*self._shifts, *self._by_spin.constants)
+        self._forms = model.derived_forms(purpose, make, more, once)[1]
+        self._momentum: Any = None
+        self._vector = compat.create_vector(model.structure.V)
+
+    def _value(self, form: Any) -> float:
+        """Evaluate a functional; of an uncoupled hub with the structure undeformed and at rest in the frame."""
+        kept = None if self.coupled else [x.copy() for x in self._state]
+        if kept is not None:
+            self._write([0.0] * 3)
+        value = float(summed(self.model.comm, fem.assemble_scalar(form)))
+        if kept is not None:
+            self._write(kept)
+        return value
+
+    def _write(self, values: list[Any]) -> None:
+        for x, value in zip(self._state, values, strict=True):
+            x[:] = value
+
+    def residual(self, t: float) -> float:
+        """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m."""
+        _, speed, rate = self.angle.values
+        own = self.hub.inertia * rate + self.hub.damping * speed
+        return float(own + self.work() - self.torque(t))
+
+    def torque(self, t: float, after: bool = False) -> float:
+        """Return M at time t (s) and the state, N·m; after a jump there if wanted."""
+        return self.hub.torque.on(t, self.seen, after)
+
+    def seen(self) -> tuple[float, float, dict[str, float]]:
+        """Return psi (rad), psi' (rad/s) and the unknowns at the tip by name: the arguments of a controller."""
+        s, (psi, speed, _) = self.model.structure, self.angle.values
+        tip = s.whole_values(s.tip_values(s.total(self._state[0])))
+        return float(psi), float(speed), dict(zip(s.components, map(float, tip), strict=True))
+
+    def work(self) -> float:
+        """Return the work of the structure in the rigid turn, N·m."""
+        return self._value(self._forms["moment"])
+
+    def diagonal(self, c_v: float, c_m: float) -> float:
+        """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
+        own = c_v * self.hub.damping + c_m * self.hub.inertia
+        if "spin" not in self._forms:
+            return own
+        self._by_spin.set(c_v, c_m)
+        return own + self._value(self._forms["spin"])
+
+    def rest_inertia(self) -> float:
+        """Return the moment of inertia of hub and undeformed structure about the axis, kg·m²; writes that state."""
+        self._write([0.0] * 3)
+        return self.diagonal(0.0, 1.0)
+
+    def row(self, shifts: tuple[float, float, float]) -> Any:
+        """Return ∂(residual)/∂q as a PETSc vector (reused); zero if uncoupled."""
+        if not self.coupled:
+            self._vector.zeroEntries()
+            return self._vector
+        for constant, value in zip(self._shifts, shifts, strict=True):
+            constant.value = value
+        return assembled(self._forms["row"], self.model.structure.V, self._clamped, self._vector)
+
+    @property
+    def has_outside(self) -> bool:
+        """Whether there are external forces."""
+        return "outside" in self._forms
+
+    def outside(self) -> float:
+        """Return the moment of all external forces but torque and brake (N·m)."""
+        return -self._value(self._forms["outside"]) if self.has_outside else 0.0
+
+    def angular_momentum(self) -> float:
+        """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""
+        if self._momentum is None:
+            self._momentum = forms.form(work.momentum(self.model.mechanics, self.model.turn))
+        return self.hub.inertia * float(self.angle.values[1]) + self._value(self._momentum)
+
+    def kinetic(self) -> float:
+        """Return ½ I_R psi'², J."""
+        return 0.5 * self.hub.inertia * float(self.angle.values[1]) ** 2
