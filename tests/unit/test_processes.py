@@ -9,7 +9,6 @@ from mpi4py import MPI
 
 import rotfem
 from rotfem.commands.processes import SHARED_FROM, communicator, shared_out, unknowns
-from rotfem.errors import InputError
 from rotfem.scene import as_scene
 from tests.beams import STRUCTURE
 
