@@ -334,10 +334,6 @@ class Sweep:
         beside = [s for s in points if s.speed < left.speed][-1:] + [s for s in points if s.speed > right.speed][:1]
         return between((left, right), beside)
 
-    def found(self) -> list[float]:
-        """Return all frequencies of the branches, rad/s."""
-        return [point.value(b).imag for point in self.points for b in range(self.count)]
-
     # --- what the diagram says ----------------------------------------------------------------------------------------
 
     def wave(self, point: SpeedPoint, branch: int) -> Wave | None:
@@ -366,9 +362,11 @@ class Sweep:
             for b in range(self.count):
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
-                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0})) if self._meets(i, b, k)]
+                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0}))]
         for (i, b, k), (speeds, solves) in zip(wanted, self.each(wanted, self._meetings), strict=True):
             self.solves += solves
+            if not speeds:
+                continue
             left, right = self.points[i : i + 2]
             wave = self.wave(left if k is None else right, b)
             way = self.direction(right, b)
@@ -394,17 +392,11 @@ class Sweep:
         omega = 0.0 if zero else point.signed(b)
         return omega if k is None else abs(omega) - k * abs(point.speed)
 
-    def _meets(self, i: int, b: int, k: int | None) -> bool:
-        """Return whether a branch has the frequency kΩ, or passes zero without k, between two points.
-
-        What has no frequency at rest is on all lines there.
-        """
-        gaps = np.array([self._gap(point, b, k) for point in self.paths[i].points])
-        at_end = abs(gaps[0]) > 0.0 and gaps[-1] == 0.0 and self.points[i + 1].speed != 0.0
-        return bool(at_end or np.any(gaps[1:] * gaps[:-1] < 0.0))
-
     def _meetings(self, place: tuple[int, int, int | None]) -> tuple[list[float], int]:
-        """Return the speeds after the point i where a branch b has the frequency kΩ, and solutions that took."""
+        """Return the speeds after the point i where a branch b has the frequency kΩ, and solutions that took.
+
+        Without k it passes zero there. What has no frequency at rest is on all lines there.
+        """
         i, b, k = place
         before, self.solves, path = self.solves, 0, self.paths[i]
         error = 0.0 if self.final else FIRST * (path.right.speed - path.left.speed)
@@ -412,7 +404,7 @@ class Sweep:
             speed if self.final else self._met(path, b, k, speed)
             for speed in path.zeros(lambda point: self._gap(point, b, k), error)
         ]
-        if self._gap(path.right, b, k) == 0.0:
+        if self._gap(path.right, b, k) == 0.0 != self._gap(path.left, b, k) and path.right.speed != 0.0:
             found.append(path.right.speed)
         taken, self.solves = self.solves, before
         return found, taken

@@ -87,50 +87,14 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
     return rows, {name: float(summed(analysis.comm, r @ momenta[name])) for name, r in along.items()}
 
 
-def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]:
-    """Return how far symmetry, the spectrum and the linearisation are from what theory says (all relative).
+def self_checks(spinning: Spinning) -> dict[str, float]:
+    """Return how far symmetry and the spectrum are from what theory says (relative).
 
-    M and K symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ. The tangents are
-    compared with central differences of the residual in the nonlinear theories.
+    M and K are symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ.
     """
     out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries.items()}
-    if spinning.pencil.spectrum_error is not None:
-        out["spectrum"] = spinning.pencil.spectrum_error
-    # A linear system's residual is made of these very matrices.
-    if not analysis.system.linear and analysis.fixed is None:
-        out["linearisation"] = linearisation_error(analysis, spinning)
-    return out
-
-
-def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
-    """Return the relative difference between M, C, K times a vector and central differences of the residual."""
-    system, pencil = analysis.system, spinning.clamped
-    zero = system.zeros()
-    # A direction without structure: for a mode, K x is what is left when large axial terms cancel.
-    system.q.x.array[:] = np.random.default_rng(1).standard_normal(zero.size) * system.scale
-    system.q.x.scatter_forward()
-    direction = system.q.x.array.copy()
-    system.set_time(0.0, system.motion.at_speed(spinning.speed))
-    worst = 0.0
-
-    def residual(q: Array, v: Array, a: Array) -> Array:
-        system.set_state(q, v, a)
-        return -np.asarray(system.residual_in_motion().array)
-
-    owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
-    direction[system.clamped] = 0.0
-    # The residual is quadratic in v and linear in a, so that central differences are exact there, however long.
-    for A, slot, step in ((pencil.K, 0, 1e-7), (pencil.C, 1, 1.0), (pencil.M, 2, 1.0)):
-        plus, minus = [spinning.q, zero, zero], [spinning.q, zero, zero]
-        plus[slot], minus[slot] = plus[slot] + step * direction, minus[slot] - step * direction
-        difference = (residual(*plus) - residual(*minus)) / (2 * step)
-        exact = pencil.apply(A, direction[:owned, None].astype(complex))[:, 0].real
-        exact[system.clamped] = 0.0
-        sums = np.array([np.sum((difference - exact) ** 2), np.sum(exact**2)])
-        error, size = analysis.comm.allreduce(sums)
-        worst = max(worst, float(np.sqrt(error / size)) if size > 0 else 0.0)
-    system.set_state(spinning.q)
-    return worst
+    spectrum = spinning.pencil.spectrum_error
+    return out if spectrum is None else out | {"spectrum": spectrum}
 
 
 @dataclass
@@ -187,16 +151,6 @@ class Spinning:
         """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs, with the `nonzero` λ."""
         return self.pencil.gram(self.pairs.left, self.nonzero, self.pairs.right, self.nonzero)
 
-    def modal_basis(self, count: int) -> Spinning:
-        """Return it with the pairs that motions are sums of: of its first modes those that are not zero to round-off.
-
-        With the growing one of two real λ and −λ of a conservative pencil comes the other: P(−λ) is P(λ)ᵀ.
-        """
-        pairs = self.pairs.select(np.flatnonzero(self.pairs.bounds[:count] < 1.0))
-        real = pairs.select(np.flatnonzero((pairs.values.imag == 0.0) & self.pencil.conservative))
-        other = Eigenpairs(-real.values, real.left, real.right, real.errors, real.bounds)
-        return replace(self, pairs=pairs.joined(other), described=None)
-
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
         return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)
@@ -219,7 +173,6 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
-        estimates: whether the error by the mesh is wanted.
         notes: remarks on the way to equilibria.
         kept: the same modes with the stiff strains as unknowns.
     """
@@ -243,7 +196,6 @@ class ModalAnalysis:
         self._unit: float | None = None
         self.kept = KeptDigits(self.system)
         self.notes = list[str]()
-        self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}

@@ -67,8 +67,7 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
     if np.any(spinning.pairs.bounds[:count] >= 1.0):
         what = "there is no static answer to a force: a mode has the frequency zero to round-off"
         raise ComputationError(what, advice="a spring at a hinge that nothing holds")
-    spinning = spinning.modal_basis(count)
-    pairs, n = spinning.pairs, np.diag(spinning.own)
+    pairs, n = spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values)))), np.diag(spinning.own)
     tip = structure.tip_values.columns(len(spinning.q))
     blocks, rows, columns = [], [], []
     for j, lam in enumerate(pairs.values):
@@ -81,6 +80,10 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
             blocks.append(np.array([[lam.real]]))
             rows.append(gain.real)
             columns.append(shape.real)
+            if spinning.pencil.conservative:  # with it comes −λ, as P(−λ) is P(λ)ᵀ
+                blocks.append(np.array([[-lam.real]]))
+                rows.append(-(tip.T @ pairs.right[:, j] / n[j]).real)
+                columns.append((tip.T @ pairs.left[:, j]).real)
     A = block_diag(*blocks)
     B, C = np.array(rows), np.array(columns).T
     flexibility = tip.T @ DirectSolver(spinning.pencil.K).solve_all(tip)  # static answer to unit forces and moment

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +23,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import over_range
 from rotfem.commands.advice import frozen_inputs
 from rotfem.commands.interrupts import together
-from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
+from rotfem.commands.mode_tables import advice, doubtful, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
@@ -107,17 +105,14 @@ def campbell(
             the diagram of the speeds before it.
         Stopped: it was interrupted; likewise.
     """
-    marks: dict[str, Any] = {
+    marks = {
         "modes.orders": list(range(1, orders + 1)) if isinstance(orders, int) else orders,
         "modes.rated": rated,
         "modes.operating": operating,
     }
-    as_list = {k: list(v) for k, v in marks.items() if isinstance(v, Sequence) and not isinstance(v, str)}
-    marks = {k: v for k, v in (marks | as_list).items() if v is not None}
-    scene = as_scene(scene).showing("speed", speeds)
-    scene = scene.replace(marks) if marks else scene
-    text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
-    values = parse_speeds(text)
+    given = {k: list(v) if isinstance(v, tuple) else v for k, v in marks.items() if v is not None}
+    scene = as_scene(scene).showing("speed", speeds).replace(given)
+    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
 
     def compute(variant: Scene) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
@@ -133,10 +128,10 @@ def diagram(
     analysis: ModalAnalysis,
     values: Sequence[float],
     started: float,
-    progress: Progress | None = None,
-    hint: Hint | None = None,
-    only: bool = False,
-    kept: FinishedSpeeds | None = None,
+    progress: Progress | None,
+    hint: Hint | None,
+    only: bool,
+    kept: FinishedSpeeds | None,
 ) -> CampbellResult:
     """Return the branches over speed, with what the diagram says."""
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
@@ -153,7 +148,7 @@ def diagram(
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))
-        orders, crossings, onsets = meetings(sweep, scene)
+        orders, crossings, onsets = meetings(sweep, marks.orders)
     except (ComputationError, KeyboardInterrupt) as stop:
         if isinstance(stop, KeyboardInterrupt) and not together(analysis.everyone, stop):
             raise
@@ -161,59 +156,58 @@ def diagram(
             kept.save(sweep.points)
         if len(sweep.points) < 2:
             raise
-        stopped, sweep.only, analysis.estimates = stop, True, False
-        orders, crossings, onsets = meetings(sweep, scene)
-    count = sweep.count
-    labels = branch_labels(analysis, sweep, count)
-    errors = branch_errors(scene, analysis, sweep, count) if analysis.estimates else None
+        stopped, sweep.only = stop, True
+        orders, crossings, onsets = meetings(sweep, marks.orders)
+    labels, last = branch_labels(analysis, sweep), sweep.points[-1]
+    errors = branch_errors(scene, analysis, sweep) if scene.output.error and stopped is None else None
     mesh = None if errors is None else errors.each
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
     for crossing in crossings:
         crossing["label"] = labels[crossing["branch"] - 1]
-    last = sweep.points[-1].spinning.first(count)
-    of_last = {} if mesh is None else dict(zip(sweep.points[-1].order, mesh, strict=False))
-    known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
+    goes_on = "" if kept is None else "; the same command goes on from there"
+    done = f"{sum(p.requested for p in sweep.points)} of {len(values)} speeds are finished, up to "
     warnings = [
         *advice(analysis, fastest),
         *frozen_inputs(analysis.problem),
-        *remarks(sweep, labels, onsets, mode_rows(analysis, last, known)),
-        *([] if stopped is None else [stopped_after(sweep, values, kept)]),
+        *remarks(sweep, labels, onsets),
+        *(f"at {speed_text(last.speed)}, {text}" for text in doubtful([r for r in rows if r["speed"] == last.speed])),
+        *([] if stopped is None else [f"{done}{speed_text(last.speed)}{goes_on}"]),
         *([] if errors is None else warnings_of(errors, Setting.of(scene, moving=False), scene)),
     ]
+    basis = None if sweep.model is None else {"columns": sweep.model.columns, "checks": sweep.model.checks}
+    more = {
+        "status": None if stopped is None else "failed" if isinstance(stopped, ComputationError) else "interrupted",
+        "rated": marks.rated,
+        "operating": None if marks.operating is None else list(marks.operating),
+        "error": None if errors is None else errors.summary(),
+        "reduced_basis": basis,
+    }
     summary = {
         **modal_summary("campbell", analysis, scene, started),
-        **({} if stopped is None else {"status": "failed" if isinstance(stopped, ComputationError) else "interrupted"}),
         "branches": [
             {
                 "branch": b + 1,
-                "label": labels[b],
+                "label": label,
                 "confidence": min(float(point.confidence[b]) for point in sweep.points),
                 "frequency_first": _finite(sweep.points[0].value(b).imag),
-                "frequency_last": _finite(sweep.points[-1].value(b).imag),
+                "frequency_last": _finite(last.value(b).imag),
             }
-            for b in range(count)
+            for b, label in enumerate(labels)
         ],
         "per_rev": max(orders, default=0),
         "orders": list(orders),
-        **({} if marks.rated is None else {"rated": marks.rated}),
-        **({} if marks.operating is None else {"operating": list(marks.operating)}),
         "critical_speeds": crossings,
         "instabilities": onsets,
         "ambiguous": sweep.ambiguous,
         "speeds": len(values),
         "speeds_inserted": sweep.inserted,
         "speeds_solved": sweep.solves,
-        **({} if errors is None else {"error": errors.summary()}),
-        "checks": self_checks(analysis, sweep.points[-1].spinning),
-        **(
-            {}
-            if sweep.model is None
-            else {"reduced_basis": {"columns": sweep.model.columns, "checks": sweep.model.checks}}
-        ),
-        "lowest_frequency": min((w for w in sweep.found() if w > 0), default=0.0),
+        "checks": self_checks(last.spinning),
+        "lowest_frequency": min((row["frequency"] for row in rows if row["frequency"] > 0), default=0.0),
         "warnings": warnings,
         "advice": hints,
+        **{name: value for name, value in more.items() if value is not None},
     }
     result = CampbellResult(summary, rows)
     if isinstance(stopped, ComputationError):
@@ -226,22 +220,16 @@ def diagram(
     return result
 
 
-def meetings(sweep: Sweep, scene: Scene) -> tuple[tuple[int, ...], list[dict[str, Any]], list[dict[str, Any]]]:
+def meetings(
+    sweep: Sweep, orders: Sequence[int] | None
+) -> tuple[Sequence[int], list[dict[str, Any]], list[dict[str, Any]]]:
     """Return the orders k of the lines kΩ, critical speeds and ranges of instability."""
     sweep.count = min(sweep.count, len(sweep.points[0].order))
-    orders = scene.modes.orders
     if orders is None:
         fastest = max(abs(point.speed) for point in sweep.points)
-        most = int(np.clip(np.ceil(max(sweep.found(), default=0.0) / max(fastest, 1e-300)), 1, 4))
-        orders = tuple(range(1, most + 1))
+        highest = np.nanmax([point.value(b).imag for point in sweep.points for b in range(sweep.count)])
+        orders = range(1, 1 + int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4)))
     return orders, sweep.critical_speeds(orders), sweep.onsets()
-
-
-def stopped_after(sweep: Sweep, values: Sequence[float], kept: FinishedSpeeds | None) -> str:
-    """Return how far a diagram came that has not all its speeds."""
-    done = sum(point.requested for point in sweep.points)
-    goes_on = "" if kept is None else "; the same command goes on from there"
-    return f"{done} of {len(values)} speeds are finished, up to {speed_text(sweep.points[-1].speed)}{goes_on}"
 
 
 class FinishedSpeeds:
@@ -258,19 +246,15 @@ class FinishedSpeeds:
 
     def load(self, analysis: ModalAnalysis) -> dict[float, Spinning]:
         """Return speed ↦ modes there; none where there is no file of this scene."""
-        try:
-            with np.load(self._path, allow_pickle=False) as file:
-                arrays = dict(file)
-        except (OSError, ValueError, EOFError, BadZipFile):
+        if not self._path.exists():
             return {}
-        if str(arrays.pop("key", "")) != self._key:
-            return {}
-        out = {}
-        for i, speed in enumerate(arrays["speeds"].tolist()):
-            pairs = Eigenpairs(*(arrays[f"{name}_{i}"] for name in PAIRS))
-            q = arrays[f"q_{i}"]
+        with np.load(self._path) as file:
+            arrays = dict(file)
+        out = dict[float, Spinning]()
+        for i, speed in enumerate(arrays["speeds"].tolist() if str(arrays["key"]) == self._key else []):
+            q, *pairs = (arrays[f"{name}_{i}"] for name in ("q", *PAIRS))
             pencil, clamped = analysis.pencils(speed, q)
-            out[speed] = Spinning(speed, q, pencil, pairs, clamped, bool(arrays["rigid"][i]))
+            out[speed] = Spinning(speed, q, pencil, Eigenpairs(*pairs), clamped, bool(arrays["rigid"][i]))
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
@@ -281,7 +265,7 @@ class FinishedSpeeds:
         arrays: dict[str, Any] = {"key": self._key, "speeds": [s.speed for s in done], "rigid": [s.rigid for s in done]}
         for i, s in enumerate(done):
             arrays |= {f"q_{i}": s.q, **{f"{name}_{i}": getattr(s.pairs, name) for name in PAIRS}}
-        new = self._path.with_name(f".rotfem-{os.getpid()}.npz")
+        new = self._path.with_name(".rotfem-speeds.npz")
         with writing(self._path):
             np.savez(new, **arrays)
             new.replace(self._path)
@@ -307,11 +291,10 @@ def solved_by_all(
     return dict(zip(values, shared_out(values, solve, analysis.everyone), strict=True))
 
 
-def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:
+def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:
     """Return warnings of branches that were lost or are unsure, and of instabilities."""
-    last = sweep.points[-1]
-    lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
-    out = []
+    last, out = sweep.points[-1].order, list[str]()
+    lost = [label for b, label in enumerate(labels) if last[b] < 0]
     out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {speed_text(a['speed'])}, correlation {a['confidence']:.2f}"
@@ -324,19 +307,19 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
     ]
     if sweep.only and sweep.model is None:
         out.append("critical speeds and onsets of instability are interpolated between the speeds that were solved")
-    return out + [f"at {speed_text(last.speed)}, {text}" for text in (*instabilities(ends), *doubtful(ends))]
+    return out
 
 
-def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:
+def branch_labels(analysis: ModalAnalysis, sweep: Sweep) -> list[str]:
     """Return the names of the branches: of their modes at the first speed, of a rotor where most of them precess."""
 
     def precessing(point: SpeedPoint) -> tuple[int, int]:
-        there = [b for b in range(count) if point.order[b] >= 0]
+        there = [b for b in range(sweep.count) if point.order[b] >= 0]
         return len(there), sum(sweep.direction(point, b) != "" for b in there)
 
     point = max(sweep.points, key=precessing)  # the first of several
     names = analysis.described(point.spinning).names
-    return distinct([names[point.order[b]] for b in range(count)])
+    return distinct([names[point.order[b]] for b in range(sweep.count)])
 
 
 def _finite(value: float) -> float | None:
@@ -344,11 +327,11 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def branch_errors(scene: Scene, analysis: ModalAnalysis, sweep: Sweep, count: int) -> Errors:
+def branch_errors(scene: Scene, analysis: ModalAnalysis, sweep: Sweep) -> Errors:
     """Return the errors of the branches, the larger ones of those at both ends; `each` is that by the mesh."""
     found, each, compiled = list[Errors](), list[list[float]](), dict[str, ModalAnalysis]()
     for point in (sweep.points[0], sweep.points[-1]):
-        order = [int(i) for i in point.order[:count]]
+        order = [int(i) for i in point.order[: sweep.count]]
         # What the mesh does to modes far above would be taken for errors of these.
         found.append(modal_errors(scene, analysis, point.spinning.first(1 + max(order)), compiled=compiled))
         there = found[-1].each

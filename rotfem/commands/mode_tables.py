@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -54,9 +53,7 @@ def mode_tables(
     return out
 
 
-def mode_rows(
-    analysis: ModalAnalysis, spinning: Spinning, mesh: Sequence[float | None] | None = None
-) -> list[dict[str, Any]]:
+def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     rows, pairs, described = [], spinning.pairs, analysis.described(spinning)
     names, waves = distinct(described.names), described.waves
@@ -75,7 +72,6 @@ def mode_rows(
                 **(whirl(waves[i], float(lam.imag), abs(spinning.speed)) if waves else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
-                **({} if mesh is None else {"mesh_error": mesh[i]}),
             }
         )
     return rows

@@ -142,7 +142,6 @@ def _modes(
     least = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
     if stability.stable is None or stability.held_by_spin or stability.growth > max(least, 0.0):
         warnings.append(stability.warning())
-    checks = self_checks(analysis, spinning)
     if scene.output.error and errors is None:
         errors = modal_errors(scene, analysis, spinning, seconds=seconds)
     if errors is not None:
@@ -158,7 +157,7 @@ def _modes(
         "stability": stability.summary(),
         **({} if errors is None else {"error": errors.summary(), "settings": errors.rows}),
         **{name: found.summary[name] for name in ("modes", "shapes")},
-        "checks": checks,
+        "checks": self_checks(spinning),
         "warnings": warnings,
         "advice": hints,
     }
@@ -173,7 +172,6 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm, counted: boo
     """Return the modal analysis that a scene asks for, of a small system each process for itself."""
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
     analysis.everyone = comm
-    analysis.estimates = scene.output.error
     if counted and "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis

@@ -202,20 +202,9 @@ class NonlinearSystem(System):
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
         if self._over is not None:
             return self._over.residual()
-        return self._negative(self._F, self.moving)
-
-    def residual_in_motion(self) -> Any:
-        """Return −F as `residual` does, of a system that is not moving with velocities and accelerations too."""
-        return self._negative(self._F_in_motion, True)
-
-    @per_composition
-    def _F_in_motion(self) -> list[Any]:
-        return self._F if self.moving else [forms.form(self.model.residual, once=True)]
-
-    def _negative(self, parts: list[Any], moving: bool) -> Any:
-        b = self.sum_of(parts)
+        b = self.sum_of(self._F)
         b *= self.signs
-        if moving and self.by_mode is not None:
+        if self.moving and self.by_mode is not None:
             owned = self.b.array
             owned -= self.by_mode.times(self._state[1][: len(owned)])
         return self.b

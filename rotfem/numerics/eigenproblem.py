@@ -209,11 +209,6 @@ class Eigenpairs:
         vectors = self.right[:, index], self.left[:, index]
         return Eigenpairs(self.values[index], *vectors, self.errors[index], self.bounds[index])
 
-    def joined(self, others: Eigenpairs) -> Eigenpairs:
-        """Return these pairs and others behind them."""
-        names = ("values", "right", "left", "errors", "bounds")
-        return Eigenpairs(*(np.concatenate([getattr(self, n), getattr(others, n)], axis=-1) for n in names))
-
 
 def backward_errors(pencil: Pencil, values: Array, X: Array) -> Array:
     """Return the normwise backward errors of eigenpairs, ‖(λ² M + λ C + K) x‖ / [(|λ|² ‖M‖ + |λ| ‖C‖ + ‖K‖) ‖x‖]."""
