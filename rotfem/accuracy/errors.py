@@ -28,6 +28,7 @@ import numpy as np
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
+from rotfem.analysis.schemes import LONGEST
 from rotfem.errors import ComputationError, InputError
 from rotfem.results.distance import Series, Spectrum
 from rotfem.scene import Scene
@@ -44,8 +45,8 @@ LONGER = 1.5
 #: Order of steps that holds for all motions.
 CERTAIN = 2
 
-#: Longest adaptive step as a part of the history (`rotfem.analysis.march.LONGEST`), and the loosest tolerance.
-LONGEST, LOOSEST = 0.05, 0.5
+#: Loosest tolerance of adaptive steps.
+LOOSEST = 0.5
 
 #: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
 FEWER = 0.75

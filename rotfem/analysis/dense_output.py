@@ -19,8 +19,8 @@ from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.time_grid import CLOSE
 from rotfem.equations.system import System
 
-#: Part of the cubic's largest acceleration by which those of the states may differ from its own.
-KNOWN = 0.5
+#: Part of the cubic's largest acceleration by which those of the states may differ from its own; else they are noise.
+NOISE = 0.5
 
 
 def multiples(interval: float, end: float) -> Array:
@@ -87,7 +87,7 @@ def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
         accelerations = bent.dot(points)
         sizes = [float(np.abs(x).max(initial=0.0)) for x in (data[2::3] - accelerations, accelerations)]
         off, size = sizes if comm.size == 1 else (comm.allreduce(x, MPI.MAX) for x in sizes)
-        if off <= KNOWN * size:
+        if off <= NOISE * size:
             return np.asarray(_coefficients(3)[0].dot(data))
     return np.asarray(cubic.dot(points))
 

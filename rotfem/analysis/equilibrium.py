@@ -38,7 +38,7 @@ Array = npt.NDArray[np.float64]
 SMALLEST_SHARE, REGULAR_SHARE = 1e-5, 1e-3
 
 #: Bound of the relative error by round-off from which it is warned of, and the largest that is given as a number.
-DIGITS, KNOWN = 1e-2, 1.0
+ROUNDED_OFF, LOST = 1e-2, 1.0
 
 
 def steady_state(
@@ -100,7 +100,7 @@ def _compliance_lost(system: System, growth: LoadFactors) -> bool:
     system.set_state(q)
     K, load = system.matrix(1.0, 0.0, 0.0, 1.0), system.residual()
     try:
-        return rounded_compliance(system, K, system.local(DirectSolver(K).solve(load))) >= KNOWN
+        return rounded_compliance(system, K, system.local(DirectSolver(K).solve(load))) >= LOST
     except ComputationError:
         return False
 
@@ -396,7 +396,7 @@ def balance(
 
     increment = limited(system, q, correction)
     if system.linear:
-        if not np.isfinite(increment(True)[0]) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
+        if not np.isfinite(increment(True)[0]) or (system.structure.hinges and conditioning(system, q) >= LOST):
             raise ComputationError(f"no steady state at {speed_text(growth.omega)}: the stiffness is singular")
         newton.iterations += 1
     else:
@@ -486,9 +486,9 @@ def rounded_compliance(system: System, K: Any, q: Array) -> float:
 
 def said_of(bound: float) -> str:
     """Return a warning of an error bound; empty of one that is small."""
-    if not bound > DIGITS:
+    if not bound > ROUNDED_OFF:
         return ""
-    how = f"by up to {100 * bound:.2g} %" if bound < KNOWN else "beyond recognition"
+    how = f"by up to {100 * bound:.2g} %" if bound < LOST else "beyond recognition"
     return (
         f"unreliable: round-off may have changed the displacements {how}, as axial or shear stiffness outweighs what "
         f'bends; fewer elements, cells less oblong, or model.theory = "{richest().name}", which sums its strains anew '

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import limited
 from rotfem.analysis.modal import ModalAnalysis
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.linear import DirectSolver
@@ -77,7 +78,7 @@ class FirstMotion:
         return signal, np.array([mass.real, mass.imag])[energies > 1e-2 * energies.sum()]
 
 
-def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
+def in_mode(system: System, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
     """Return (q, q̇) of the nonlinear motion that a mode is of, local dof arrays.
 
     The linear shape q₁ alone lacks the foreshortening by bending; the axial stiffness would give it far more energy
@@ -116,7 +117,7 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
     return q, constrained(pencil.K, -np.real(forces[:, 0]), along(rate))
 
 
-def of_velocities(system: Any, rows: Any) -> Array:
+def of_velocities(system: System, rows: Any) -> Array:
     """Return q̇ (local dof array) of a beam whose axis has the velocities of rows (x, v1, v2, v3), linear between.
 
     Its sections turn with the slope of the axis. Clamped unknowns rest.

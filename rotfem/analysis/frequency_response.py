@@ -22,6 +22,7 @@ import numpy.typing as npt
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.clamp import along_axis
 from rotfem.equations.stations import StationChanges
+from rotfem.equations.system import System
 from rotfem.numerics.linear import ComplexSolver
 from rotfem.numerics.projection import summed
 
@@ -93,13 +94,13 @@ class FrequencyResponse:
         return points[(points >= low) & (points <= high)], undamped
 
 
-def tip_output(system: Any) -> HarmonicOutput:
+def tip_output(system: System) -> HarmonicOutput:
     """Return the unknowns at the tip."""
     values = system.structure.tip_values
     return HarmonicOutput(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
 
 
-def root_output(system: Any, push: Array) -> HarmonicOutput:
+def root_output(system: System, push: Array) -> HarmonicOutput:
     """Return force and moment of the hub on the structure; what is at the state in the system is the equilibrium."""
     K, C, M = system.clamp_tangents()
 
@@ -112,7 +113,7 @@ def root_output(system: Any, push: Array) -> HarmonicOutput:
     )
 
 
-def hub_output(system: Any) -> HarmonicOutput:
+def hub_output(system: System) -> HarmonicOutput:
     """Return the angle (rad) of a free hub, the last unknown on the last process."""
     last = system.comm.size - 1
 
@@ -123,7 +124,7 @@ def hub_output(system: Any) -> HarmonicOutput:
     return HarmonicOutput(("psi",), read)
 
 
-def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
+def root_of_free_hub(system: System, push: Array, speed: float) -> HarmonicOutput:
     """Return the same as `root_output` where the hub is free, in balance with its equation."""
     plain, angle, row = root_output(system, push), hub_output(system), system.row
     assert row is not None
@@ -152,7 +153,7 @@ def root_of_free_hub(system: Any, push: Array, speed: float) -> HarmonicOutput:
     return HarmonicOutput(plain.names, read, in_balance(plain.given, 0.0))
 
 
-def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, ...]) -> HarmonicOutput:
+def station_output(system: System, positions: tuple[float, ...], names: tuple[str, ...]) -> HarmonicOutput:
     """Return section forces, strains and unknowns at stations of a beam; the equilibrium is written into the system."""
     changes, owned = StationChanges(system, positions), len(system.root.weights)
     columns = [changes.names.index(name) for name in names]

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.schemes import Array, Observer, Pace, Scheme, Shifts, Stage, State
-from rotfem.analysis.time_grid import Leg, TimeGrid, knots_of
+from rotfem.analysis.schemes import LONGEST, Array, Observer, Pace, Scheme, Shifts, Stage, State
+from rotfem.analysis.time_grid import Interval, intervals, knots_of
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
@@ -62,14 +62,14 @@ LARGEST_LINEAR_DEFLECTION = 1.0
 HALVINGS = 5
 
 #: Newton iterations after which a solution counts as a long one, and up to which the prediction was good.
-LONG, SHORT = 6, 3
+LONG_SOLUTION, GOOD_PREDICTION = 6, 3
 
 #: Error of a step that the controller aims at, as a part of the allowed one: a vibration's local error is its largest
 #: times |cos φ|, ½ in the geometric mean over phases. Smallest ratio of two steps, also of one that was not solved.
-AIM, SHRINK = 0.5, 0.2
+AIM_OF_ERROR, SHRINK = 0.5, 0.2
 
-#: The longest step, as a part of the end: a history is drawn. Steps, rejected ones included, that a march may take.
-LONGEST, MOST_STEPS = 0.05, 500_000
+#: Steps, rejected ones included, that a march may take.
+MOST_STEPS = 500_000
 
 #: What to do beyond.
 QUICKER = (
@@ -87,7 +87,7 @@ class LastSolution:
 
     Attributes:
         shifts: (1, c_v, c_a) of the tangent whose factor is kept; None where none is.
-        long: whether it took more than LONG tangents; then the next ones have the stresses of `PointStresses`.
+        long: whether it took more than LONG_SOLUTION tangents; then the next ones have the stresses of `PointStresses`.
         confirmed: part of the predicted move that it confirmed; the next prediction is shortened to it.
     """
 
@@ -154,18 +154,21 @@ class March:
 
     def _fixed(self, state: State) -> Iterator[State]:
         """Yield the states at step, 2 step, … and end (s); the last step may be shorter."""
-        grid, reached = TimeGrid.of(self.system.signals, self.steps, lands=self.scheme.order > 2), state.t
-        for leg, after in pairwise(chain((leg for leg in grid if leg.end > reached), [None])):
-            assert leg is not None
-            start = self.begun(state, View(1), leg) if state.t == 0.0 else state
-            with self.system.view.as_in(leg.finish):
-                state = self.advance(start, leg.length, leg.end)
+        steps, step, reached = self.steps, float(self.steps.step or 0.0), state.t
+        times = np.append(np.arange(int(np.ceil(steps.end / step - 1e-9))) * step, steps.end)
+        knots = knots_of(self.system.signals, times, steps.breakpoints)
+        grid = (part for part in intervals(knots, times, step, self.scheme.order > 2) if part.end > reached)
+        for part, after in pairwise(chain(grid, [None])):
+            assert part is not None
+            start = self.begun(state, View(1), part) if state.t == 0.0 else state
+            with self.system.view.as_in(part.finish):
+                state = self.advance(start, part.length, part.end)
             self._observed(start, state)
             if after is not None:
-                if after.length != leg.length:
+                if after.length != part.length:
                     state = self.scheme.resized(state, start, after.length)
-                state = self.begun(state, leg.finish, after)
-            if leg.whole:
+                state = self.begun(state, part.finish, after)
+            if part.whole:
                 yield state
 
     def _observed(self, old: State, new: State) -> None:
@@ -183,50 +186,50 @@ class March:
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 
-        def next_leg() -> tuple[Leg, State]:
-            leg = self._leg(state, min(pace.h, longest), knots, error, tolerance * pace.largest)
-            return leg, self.begun(state, seen, leg) if seen.side else state  # between fits what jumps is negligible
+        def following() -> tuple[Interval, State]:
+            part = self._interval(state, min(pace.h, longest), knots, error, tolerance * pace.largest)
+            return part, self.begun(state, seen, part) if seen.side else state  # between fits what jumps is negligible
 
-        leg, start = next_leg()
+        part, start = following()
         for _ in range(MOST_STEPS):
             # predict and solve
-            with self.system.view.as_in(leg.finish):
+            with self.system.view.as_in(part.finish):
                 try:
-                    new = self.step(start, leg.length, leg.end)
+                    new = self.step(start, part.length, part.end)
                 except ComputationError as failure:
-                    if SHRINK * leg.length < shortest:
+                    if SHRINK * part.length < shortest:
                         raise too_short(shortest, state.t, failure) from failure
                     ratio = np.inf
                 else:
                     largest = max(pace.largest, error.displacement(new))
                     allowed = max(tolerance * largest, 10 * self.newton.tolerance)  # below, errors are noise
-                    ratio = error(self.scheme.local_error(new, start), leg.length) / allowed
+                    ratio = error(self.scheme.local_error(new, start), part.length) / allowed
             # accept, or try a shorter one
             if ratio > 1.0:
                 self.rejected, grows = self.rejected + 1, False
-                pace = replace(pace, h=leg.length * max((ratio / AIM) ** (-1 / k), SHRINK))
+                pace = replace(pace, h=part.length * max((ratio / AIM_OF_ERROR) ** (-1 / k), SHRINK))
                 if pace.h < shortest:
                     raise too_short(shortest, state.t)
-                leg, start = next_leg()
+                part, start = following()
                 continue
-            wanted, ratio = min(pace.h, longest), max(ratio / AIM, 1e-12)
-            if leg.length < SHRINK * wanted:  # cut short by a knot: of longer steps its error says nothing
+            wanted, ratio = min(pace.h, longest), max(ratio / AIM_OF_ERROR, 1e-12)
+            if part.length < SHRINK * wanted:  # cut short by a knot: of longer steps its error says nothing
                 pace = replace(pace, largest=largest)
             else:
-                ratio *= max(wanted / leg.length, 1.0) ** k
+                ratio *= max(wanted / part.length, 1.0) ** k
                 factor = np.clip((ratio * pace.error) ** (-1 / (6 * k)), SHRINK, self.scheme.growth if grows else 1.0)
-                pace = Pace(float(max(wanted, leg.length) * factor), ratio, largest)
+                pace = Pace(float(max(wanted, part.length) * factor), ratio, largest)
             grows = True
             self._observed(start, new)
-            state, seen = new, leg.finish
+            state, seen = new, part.finish
             if state.t >= end:
                 yield state
                 return
-            leg, start = next_leg()
+            part, start = following()
             yield start.changed(pace=pace)
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
 
-    def _leg(self, state: State, wanted: float, knots: Array, error: LocalError, allowed: float) -> Leg:
+    def _interval(self, state: State, wanted: float, knots: Array, error: LocalError, allowed: float) -> Interval:
         """Return an interval from a state on that is about as long as wanted.
 
         It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible:
@@ -239,33 +242,33 @@ class March:
         first, last = np.searchsorted(knots, (t * (1 + SAME) + SAME * end, stop - SAME * end), side="right")
         if first == last:
             at = last < len(knots) and knots[last] <= stop + SAME * end
-            return Leg(stop, h, lands=bool(at))
-        fitted = Leg(stop, h, line=(t, stop, 3))
+            return Interval(stop, h, at_knot=bool(at))
+        fitted = Interval(stop, h, line=(t, stop, 3))
         inside = knots[first:last]
         if len(inside) > 1 and self._lost(state, fitted, inside, error) <= allowed:
             return fitted
         stop = float(inside[0])
-        return Leg(stop, stop - t, lands=True)
+        return Interval(stop, stop - t, at_knot=True)
 
-    def _lost(self, state: State, leg: Leg, knots: Array, error: LocalError) -> float:
+    def _lost(self, state: State, part: Interval, knots: Array, error: LocalError) -> float:
         """Return the displacement by what an interval loses of the signals, over all intervals like it (scaled).
 
         It is that of the tangent in a motion as quick as the knots follow each other, by the largest deviation.
         """
         s, n = self.system, len(knots)
-        if s.clamp is not None or leg.line is None:
+        if s.clamp is not None or part.line is None:
             return np.inf
-        times = np.append(knots, leg.end)
-        off = sum(signal.deviation(times, *leg.line) for signal in s.signals)
-        t, c = float(times[int(np.argmax(off))]), np.pi * n / leg.length
+        times = np.append(knots, part.end)
+        off = sum(signal.deviation(times, *part.line) for signal in s.signals)
+        t, c = float(times[int(np.argmax(off))]), np.pi * n / part.length
         s.count_rotations_from(state.reference)
         moved = []
-        for view in (View(-1), View(0, leg.line)):
+        for view in (View(-1), View(0, part.line)):
             with s.view.as_in(view):
                 s.set_time(t)
                 s.set_state(state.q, state.v, state.a)
                 moved.append(np.array(s.correction((1.0, c, c * c))))
-        return error.size(moved[1] - moved[0]) * self.steps.end / leg.length
+        return error.size(moved[1] - moved[0]) * self.steps.end / part.length
 
     # --- one step ----------------------------------------------------------------------------------------------------
 
@@ -333,7 +336,7 @@ class March:
                 """Correct the stage; return the size of the correction, and whether it is exact."""
                 nonlocal before, tangents
                 s.set_state(stage.q, stage.v, stage.a)
-                far = not s.linear and (last.long or newton.diverging or tangents >= LONG)
+                far = not s.linear and (last.long or newton.diverging or tangents >= LONG_SOLUTION)
                 dq = s.correction(stage.shifts, before if far else None) if renewed else s.chord()
                 tangents, size = tangents + renewed, s.increment_size(dq)
                 if s.solved_at_once:
@@ -355,8 +358,8 @@ class March:
             except ComputationError as error:
                 last.shifts = None
                 raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
-            last.shifts, last.long = stage.shifts if keeps else None, tangents > LONG
-            if tangents > SHORT or last.confirmed < 1.0:
+            last.shifts, last.long = stage.shifts if keeps else None, tangents > LONG_SOLUTION
+            if tangents > GOOD_PREDICTION or last.confirmed < 1.0:
                 last.confirmed = confirmed_part(s, stage.q - state.q, move)
             if balance is not None:
                 s.set_state(stage.q, stage.v, stage.a)
@@ -376,16 +379,16 @@ class March:
 
     # --- after jumps of what is prescribed ---------------------------------------------------------------------------
 
-    def begun(self, state: State, before: View, leg: Leg) -> State:
+    def begun(self, state: State, before: View, part: Interval) -> State:
         """Return a state as an interval starts from it: with the accelerations after a jump of what drives the system.
 
         Args:
             state: at the end of a step.
             before: how that step evaluates signals here.
-            leg: the interval.
+            part: the interval.
         """
-        after = View(1, leg.line)
-        if before.side == 0 and before.line == leg.line:
+        after = View(1, part.line)
+        if before.side == 0 and before.line == part.line:
             return state
         s, t = self.system, state.t
         s.count_rotations_from(state.reference)

@@ -55,6 +55,10 @@ Array = npt.NDArray[np.float64]
 Shifts = tuple[float, float, float]
 
 
+#: The longest adaptive step, as a part of the end of a history, which is drawn.
+LONGEST = 0.05
+
+
 @dataclass(frozen=True)
 class Pace:
     """Memory of the step-size controller.

@@ -3,7 +3,7 @@
 Knots are the instants at which a signal or its rate may jump: rows of tables, ends of pulses, jumps of functions, and
 `time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
 its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order. Schemes of higher order,
-and adaptive steps, take a step with few knots in legs from one to the next; with more they use lines as well.
+and adaptive steps, take a step with few knots in intervals from one to the next; with more they use lines as well.
 """
 
 from __future__ import annotations
@@ -21,87 +21,66 @@ from rotfem.mechanics.time_signals import Fit, TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
-#: Most knots in a step at which legs end; shortest leg, and distance of equal instants, as parts of a step.
-FEW, SHORT, CLOSE = 4, 1e-3, 1e-9
+#: Most knots in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
+FEW, SHORTEST, CLOSE = 4, 1e-3, 1e-9
 
 #: Smallest change, as a part of the largest value, that is searched for a jump; halvings that confirm one.
-JUMP, SURE = 1e-3, 10
+JUMP, CONFIRMED = 1e-3, 10
 
 
 @dataclass(slots=True)
-class Leg:
+class Interval:
     """A step, or a part of one.
 
     Attributes:
         end: its last instant, s.
         length: s.
-        lands: whether it ends at a knot; the next one starts with the accelerations after it.
+        at_knot: whether it ends at a knot; the next one starts with the accelerations after it.
         line: step over which polynomials replace the signals; None for their values.
         whole: whether it ends its step.
     """
 
     end: float
     length: float
-    lands: bool = False
+    at_knot: bool = False
     line: Fit | None = None
     whole: bool = True
 
     @property
     def finish(self) -> View:
         """How signals are evaluated at its end."""
-        return View(-1 if self.lands else 0, self.line)
+        return View(-1 if self.at_knot else 0, self.line)
 
 
-class TimeGrid:
-    """The legs of all steps.
+def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
+    """Yield the intervals of all steps.
 
     Args:
-        signals: prescribed data.
+        knots: of the prescribed data, s.
         times: ends of the steps, the first the start of the march, s.
         step: nominal length of a step, s.
-        breakpoints: further knots, s.
-        lands: whether steps are taken in legs from knot to knot where these are few.
+        divided: whether steps are taken from knot to knot where these are few.
     """
-
-    def __init__(
-        self,
-        signals: Sequence[TimeSignal],
-        times: Array,
-        step: float,
-        breakpoints: Sequence[float] = (),
-        lands: bool = True,
-    ):
-        self.times, self.step, self.lands = times, step, lands
-        self.knots = knots_of(signals, times, breakpoints)
-
-    @classmethod
-    def of(cls, signals: Sequence[TimeSignal], steps: Any, lands: bool) -> TimeGrid:
-        """Return the legs of fixed steps, `Steps` of a march; the last step may be shorter."""
-        n = int(np.ceil(steps.end / steps.step - 1e-9))
-        return cls(signals, np.append(np.arange(n) * steps.step, steps.end), steps.step, steps.breakpoints, lands)
-
-    def __iter__(self) -> Iterator[Leg]:
-        """Yield the legs of all steps."""
-        close = CLOSE * self.step
-        before, after = (np.searchsorted(self.knots, self.times + side * close) for side in (-1, 1))
-        ends, knots = [float(t) for t in self.times], after[1:] > after[:-1]
-        begin, length = ends[0], self.step
-        for i, end in enumerate(ends[1:]):
-            inside: Any = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
-            lands = bool(knots[i] and before[i + 1] < after[i + 1])
-            last = float(self.knots[before[i + 1]]) if lands else end
-            stops = [*inside, last] if self.lands and len(inside) <= FEW else [last]
-            if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORT * self.step:
-                stops = [last]
-            lined = len(stops) <= len(inside)
-            for stop in stops:
-                taken = stop - begin  # of one length to the last digit, so that the matrix stays
-                if abs(taken - self.step) <= close:
-                    length = self.step
-                elif abs(taken - length) > close:
-                    length = taken
-                yield Leg(stop, length, lands or stop != last, (begin, stop, 1) if lined else None, stop == last)
-                begin = stop
+    close = CLOSE * step
+    before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
+    ends, there = [float(t) for t in times], after[1:] > after[:-1]
+    begin, length = ends[0], step
+    for i, end in enumerate(ends[1:]):
+        inside: Any = knots[after[i] : before[i + 1]].tolist() if there[i] else []
+        at_knot = bool(there[i] and before[i + 1] < after[i + 1])
+        last = float(knots[before[i + 1]]) if at_knot else end
+        stops = [*inside, last] if divided and len(inside) <= FEW else [last]
+        if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORTEST * step:
+            stops = [last]
+        lined = len(stops) <= len(inside)
+        for stop in stops:
+            taken = stop - begin  # of one length to the last digit, so that the matrix stays
+            if abs(taken - step) <= close:
+                length = step
+            elif abs(taken - length) > close:
+                length = taken
+            yield Interval(stop, length, at_knot or stop != last, (begin, stop, 1) if lined else None, stop == last)
+            begin = stop
 
 
 def knots_of(signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = ()) -> Array:
@@ -133,9 +112,9 @@ def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
         edges[upper, left], values[upper, left] = middle, f
         jumps = np.linalg.norm(values[1, left] - values[0, left], axis=1) > 0.5 * change[left]
         halvings[left[jumps]] += 1
-        halvings[left[jumps & ends]] += SURE
+        halvings[left[jumps & ends]] += CONFIRMED
         left = left[jumps & ~ends]
-    knots = edges[1, halvings >= SURE]
+    knots = edges[1, halvings >= CONFIRMED]
     if len(knots) and signal.continuous:
         what = f"jumps at t = {knots[0]:.9g} s, which takes a force without bound: give a ramp or round it off"
         raise InputError(signal.name, None, what)

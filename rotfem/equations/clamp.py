@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ import ufl
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 
-from rotfem.equations.modal_damping import EFFECT
+from rotfem.equations.modal_damping import EFFECT, ByMode
 from rotfem.equations.model import Model
 from rotfem.mechanics import work
 from rotfem.mechanics.motion import Motion
@@ -42,6 +42,7 @@ from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
 from rotfem.numerics.projection import times, times_transposed
+from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -131,10 +132,31 @@ class RootReaction:
         return np.asarray(lengths @ ends.mean(axis=1) / lengths.sum())
 
 
+class Assembled(Protocol):
+    """What `ClampWork` reads of a nonlinear system (`rotfem.equations.nonlinear`)."""
+
+    model: Model
+    root: RootReaction
+    clamped: npt.NDArray[Any]
+    by_mode: ByMode | None
+    V: Any
+    q: Any
+    v: Any
+
+    def sum_of(self, parts: list[Any]) -> Array:
+        """Return compiled linear forms added up."""
+
+    def whole(self, kind: str) -> Any:
+        """Return K, C or M with the rows of the clamp."""
+
+    def whole_of(self, parts: list[Any]) -> Any:
+        """Return compiled bilinear forms added up with the rows of the clamp."""
+
+
 class ClampWork:
     """The constraint forces of the clamp, as work in the unit motions."""
 
-    def __init__(self, system: Any):
+    def __init__(self, system: Assembled):
         self._system, weights = system, system.root.weights
         fixed = np.zeros((len(weights), 1), dtype=bool)
         fixed[system.clamped] = True
@@ -303,7 +325,7 @@ class TurningClamp:
     I_rho α̈) and the spin enters as the motion of the clamped end, Simo & Vu-Quoc 1986, claim (v).
     """
 
-    def __init__(self, structure: Any, motion: Motion):
+    def __init__(self, structure: Beam, motion: Motion):
         self.motion, self.structure = motion, structure
         self._clamped_components = np.arange(2 if structure.hinges else 3)
         self.dofs = (structure.clamped[:, None] * 3 + self._clamped_components).ravel()

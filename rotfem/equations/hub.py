@@ -77,6 +77,7 @@ class HubRow:
         angle: psi and its rates, and the motion of the frame that they make.
         hub: inertia, torque, brake.
         coupled: whether it feels the elastic motion; else its work is that of the undeformed structure at rest.
+        has_outside: whether there are external forces.
     """
 
     def __init__(self, model: Model, clamped: Any, once: bool):
@@ -101,7 +102,7 @@ class HubRow:
 
         purpose, more = f"hub {model.motion.axis} {model.effects}", (*self._shifts, *self._by_spin.constants)
         self._forms = model.derived_forms(purpose, make, more, once)[1]
-        self._momentum: Any = None
+        self.has_outside, self._momentum = "outside" in self._forms, None
         self._vector = compat.create_vector(model.structure.V)
 
     def _value(self, form: Any) -> float:
@@ -160,14 +161,9 @@ class HubRow:
             constant.value = value
         return assembled(self._forms["row"], self.model.structure.V, self._clamped, self._vector)
 
-    @property
-    def has_outside(self) -> bool:
-        """Whether there are external forces."""
-        return "outside" in self._forms
-
     def outside(self) -> float:
         """Return the moment of all external forces but torque and brake (N·m)."""
-        return -self._value(self._forms["outside"]) if self.has_outside else 0.0
+        return -self._value(self._forms["outside"])
 
     def angular_momentum(self) -> float:
         """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""

@@ -12,7 +12,7 @@ dense, and kept as B (see `rotfem.numerics.projection`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,10 +20,12 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.equations.model import Model
 from rotfem.errors import InputError
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.projection import LowRank, summed, times
 from rotfem.numerics.ritz import MORE
+from rotfem.structures.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
@@ -55,20 +57,20 @@ class ModesAtRest:
     massed: Array
 
 
-def modes_at_rest(system: Any, count: int) -> ModesAtRest:
-    """Return the first modes that vibrate, as many as wanted or as there are.
+def modes_at_rest(structure: Structure, matrices: tuple[Any, Any], count: int) -> ModesAtRest:
+    """Return the first modes that vibrate of (M, K) of a structure at rest, as many as wanted or as there are.
 
     Shapes of equal frequency are combined so that each belongs to one family, if possible.
     """
-    M, K = system.matrices_at_rest()
+    M, K = matrices
     count = min(count, massed(M))
     pairs = Pencil(M, M.duplicate(), K).solve(min(count + MORE, massed(M)))
     vibrates, omegas, columns = pairs.resolved != 0.0, [], []  # others are motions that nothing holds
     omega = np.abs(pairs.values[vibrates])
     # Of frequencies that are one any turn of the shapes is one.
     for group in np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > 1e-6 * omega[1:])):
-        X = _real_span(system.comm, M, pairs.right[:, vibrates][:, group])
-        energies = family_products(system, X, times(M, X))
+        X = _real_span(structure.comm, M, pairs.right[:, vibrates][:, group])
+        energies = family_products(structure, X, times(M, X))
         distinguished = sum(i * energy for i, energy in enumerate(energies.values()))
         columns.append(X @ np.linalg.eigh(_symmetric(np.asarray(distinguished)))[1])
         omegas += [float(np.mean(omega[group]))] * X.shape[1]
@@ -95,14 +97,14 @@ def massed(M: Any) -> int:
     return int(M.comm.tompi4py().allreduce(np.count_nonzero(M.getDiagonal().array)))  # M is positive semi-definite
 
 
-def family_products(system: Any, X: Array, MX: Array) -> dict[str, Array]:
+def family_products(structure: Structure, X: Array, MX: Array) -> dict[str, Array]:
     """Return family ↦ x_i^H M x_j of the components that belong to it, over all ranks, (m, m)."""
-    structure, bs = system.structure, system.V.dofmap.index_map_bs
-    owned = system.V.dofmap.index_map.size_local * bs
+    dofmap = structure.V.dofmap
+    bs, owned = dofmap.index_map_bs, dofmap.index_map.size_local * dofmap.index_map_bs
     x, mx = (structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX))
     parts = {name: list(components) for name, (components, _) in structure.families.items()}
     return {
-        name: np.asarray(summed(system.comm, np.einsum("nci,ncj->ij", x[:, c].conj(), mx[:, c])))
+        name: np.asarray(summed(structure.comm, np.einsum("nci,ncj->ij", x[:, c].conj(), mx[:, c])))
         for name, c in parts.items()
     }
 
@@ -130,45 +132,43 @@ class ByMode(LowRank):
         return np.asarray(self.shapes @ (self.along(v) / self.omega**2))
 
 
-def damping_by_mode(system: Any) -> ByMode | None:
-    """Return the part of C of damping by mode; None without."""
-    damping = system.model.problem.structure.damping
-    if EFFECT not in system.model.effects or not damping.has_modal:
+def damping_by_mode(model: Model, matrices: Callable[[], tuple[Any, Any]]) -> ByMode | None:
+    """Return the part of C of damping by mode, of a function that returns (M, K) at rest; None without."""
+    damping = model.problem.structure.damping
+    if EFFECT not in model.effects or not damping.has_modal:
         return None
     ratios = damping.modal
-    if system.model.fixed:
+    if model.fixed:
         raise InputError(DAMPING_KEY, ratios, 'needs model.frame = "rotating": modes at rest turn with the hub')
-    modes, zeta = damped_modes(system, ratios)
+    modes, zeta = damped_modes(model, matrices(), ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
-    return ByMode(
-        modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], system.comm
-    )
+    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], model.comm)
 
 
-def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
+def damped_modes(model: Model, matrices: tuple[Any, Any], ratios: Ratios) -> tuple[ModesAtRest, Array]:
     """Return (modes, their ratios) in the order of frequency, or of each family in that order.
 
     A mode is in the family that has most of its energy.
     """
-    known, several = system.structure.families, isinstance(ratios, Mapping | tuple)
+    structure, several = model.structure, isinstance(ratios, Mapping | tuple)
     if isinstance(ratios, Mapping):
         named = {f"{name} ": given for name, given in ratios.items()}
         for name in ratios:
-            if name not in known:
-                why = f"a {system.structure.type} has no such family; allowed: {', '.join(known)}"
+            if name not in structure.families:
+                why = f"a {structure.type} has no such family; allowed: {', '.join(structure.families)}"
                 raise InputError(f"{DAMPING_KEY}.{name}", list(ratios[name]), why)
     else:
         named = {"": ratios if isinstance(ratios, tuple) else (ratios,) * MODES_OF_ONE_RATIO}
     count = sum(map(len, named.values())) + (MODES_OF_ONE_RATIO if isinstance(ratios, Mapping) else 0)
     while True:
-        modes = modes_at_rest(system, count)
-        energies = family_products(system, modes.shapes, modes.massed)
+        modes = modes_at_rest(structure, matrices, count)
+        energies = family_products(structure, modes.shapes, modes.massed)
         leading = np.argmax([np.diag(energy) for energy in energies.values()], axis=0)
         of = {f"{name} ": np.flatnonzero(leading == i) for i, name in enumerate(energies)}
         of[""] = np.arange(len(leading))
         short = [name for name, given in named.items() if len(of[name]) < len(given)]
-        if not short or (len(modes.omega) < count and not (several and is_whole(system))):
+        if not short or (len(modes.omega) < count and not (several and is_whole(model))):
             break
         if len(modes.omega) < count:
             name = short[0]
@@ -183,7 +183,7 @@ def damped_modes(system: Any, ratios: Ratios) -> tuple[ModesAtRest, Array]:
     return modes, zeta
 
 
-def is_whole(system: Any) -> bool:
-    """Return whether a system has all effects of its problem; without rotary inertia there are no modes of torsion."""
-    problem = system.model.problem
-    return set(system.model.effects) == set(problem.replace(effects=None).effective_effects())
+def is_whole(model: Model) -> bool:
+    """Return whether a model has all effects of its problem; without rotary inertia there are no modes of torsion."""
+    problem = model.problem
+    return set(model.effects) == set(problem.replace(effects=None).effective_effects())

@@ -292,8 +292,6 @@ class Model:
 
     def inside_out(self) -> bool:
         """Return whether the stretch is anywhere ≤ 0 at the state in q."""
-        if self.comm.allreduce(self.structure.hardly_moved(), op=MPI.LAND):
-            return False
         return self.stretches()[0] <= 0.0
 
     def stretches(self) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import basix
 import numpy as np
@@ -29,11 +29,15 @@ import ufl
 from dolfinx import fem, la
 from ufl.algorithms import expand_derivatives
 
+from rotfem.equations.system import System
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import PointValues
+
+if TYPE_CHECKING:
+    from rotfem.structures.plate import Plate
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +62,7 @@ class DampedStress:
     (see `rotfem.equations.modal_damping`). The mass part of Rayleigh damping is no stress.
     """
 
-    def __init__(self, system: Any):
+    def __init__(self, system: System):
         self._system = system
         self._displaced = None if system.by_mode is None else fem.Function(system.V)
         self._compiled: tuple[int, Any] | None = None
@@ -90,8 +94,9 @@ class DampedStress:
 
     def update(self, v: Array) -> None:
         """Set the velocities of the owned unknowns; collective."""
-        if self._displaced is not None:
-            w, part = self._displaced.x, self._system.by_mode
+        part = self._system.by_mode
+        if self._displaced is not None and part is not None:
+            w = self._displaced.x
             w.array[: len(part.B)] = part.displaced(v[: len(part.B)])
             w.scatter_forward()
 
@@ -103,9 +108,9 @@ class Stations:
         names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad).
     """
 
-    def __init__(self, system: Any, positions: tuple[float, ...]):
+    def __init__(self, system: System, positions: tuple[float, ...]):
         self.system, self.positions = system, np.array(positions)
-        self.beam: Beam = system.structure
+        self.beam = cast(Beam, system.structure)
         self.comm, self.degree = system.comm, system.V.element.basix_element.degree
         self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components)
         self._points = forms.quadrature_points(self.beam.mesh, self.degree)
@@ -203,7 +208,7 @@ class Stations:
 class StationChanges(Stations):
     """Derivatives of the quantities at the stations of a beam about an equilibrium of its system."""
 
-    def __init__(self, system: Any, positions: tuple[float, ...]):
+    def __init__(self, system: System, positions: tuple[float, ...]):
         super().__init__(system, positions)
         self._dq, self._dv = fem.Function(system.V), fem.Function(system.V)
 
@@ -246,7 +251,7 @@ class PlateResultants:
 
     names = RESULTANTS["plate"]
 
-    def __init__(self, system: Any):
+    def __init__(self, system: System):
         self.system, self.V = system, system.V
         mesh, element = self.V.mesh, self.V.element.basix_element
         self._points = forms.quadrature_points(mesh, element.degree)
@@ -281,4 +286,4 @@ class PlateResultants:
             self._sum.scatter_reverse(la.InsertMode.add)
         owned = self.V.dofmap.index_map.size_local
         here = total[:owned, :-1] / total[:owned, -1:]
-        return np.asarray(self.system.structure.ordered(here))
+        return np.asarray(cast("Plate", self.system.structure).ordered(here))

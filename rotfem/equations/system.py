@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from time import perf_counter
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import Assembler, Functionals, added
 from rotfem.numerics.linear import DirectSolver, SingularSolver, is_regular
 from rotfem.numerics.projection import PlusLowRank, summed, with_ghosts
+from rotfem.structures.beam import Beam
 from rotfem.structures.reference_rotation import ReferenceRotation
 
 Array = npt.NDArray[np.float64]
@@ -125,14 +126,14 @@ class System(ABC):
         self.assembled = 0.0
         self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.bcs, self.clamped = self.structure.clamp_conditions(), self.structure.clamped_unknowns()
-        self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
+        self.clamp = TurningClamp(cast(Beam, self.structure), self.motion) if model.fixed else None
         self.root = RootReaction(self.structure)
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)
         self.by_mode: ByMode | None = None
         self._compose()
-        self._by_mode = self.by_mode = damping_by_mode(self)
+        self._by_mode = self.by_mode = damping_by_mode(model, self.matrices_at_rest)
         self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
     def _compose(self) -> None:

@@ -209,7 +209,7 @@ for _effect in (
     ),
     Effect(
         "hub_coupling",
-        present=lambda problem: problem.motion.is_coupled,
+        present=lambda problem: problem.motion.hub is not None and problem.motion.hub.coupled,
         reasons=("the hub is free and coupled", "the hub does not feel the structure"),
     ),
 ):

@@ -180,11 +180,6 @@ class Motion:
         state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
         return replace(cls.constant_speed(hub.speed, axis), **(state | more))
 
-    @property
-    def is_coupled(self) -> bool:
-        """Whether a hub is free and feels the structure's motion."""
-        return self.hub is not None and self.hub.coupled
-
     def frame(self, t: float) -> dict[str, Array]:
         """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
 

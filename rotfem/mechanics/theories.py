@@ -31,7 +31,6 @@ class Theory:
         exact: whether displacements and rotations may be of any size.
         prestress: for a linear theory, second-order strains by structure type, of its geometric stiffness under the
             forces of the spinning linear structure; empty for none.
-        poorer: cheaper theories of its own family, cheapest first, which an accuracy may take instead.
         quick: whether a quick study of cost tries it.
     """
 
@@ -43,7 +42,6 @@ class Theory:
     linear: bool = False
     exact: bool = False
     prestress: Mapping[str, Strains] = field(default_factory=dict)
-    poorer: tuple[str, ...] = ()
     quick: bool = False
 
     def holds_for(self, structure: str) -> bool:
@@ -64,32 +62,9 @@ def theories() -> tuple[Theory, ...]:
     return tuple(sorted(Theory.registry, key=lambda theory: theory.rank))
 
 
-def ladder() -> tuple[str, ...]:
-    """Return the names of all theories, from the poorest to the richest."""
-    return tuple(theory.name for theory in theories())
-
-
 def richest() -> Theory:
     """Return the richest theory that holds for displacements and rotations of any size."""
     return [theory for theory in theories() if theory.exact][-1]
-
-
-def stiffened() -> Theory:
-    """Return the poorest linear theory that has the stiffening by stress."""
-    return next(theory for theory in theories() if theory.linear and theory.prestress)
-
-
-def compared(theory: Theory, structure: str) -> Theory | None:
-    """Return the richer theory that a theory is compared with, for its error; None without one.
-
-    It has the terms whose error accumulates over time: stress stiffness, which `linear` lacks, and third order, which
-    nonlinear theories of moderate rotations lack. None for exact theories and linear ones with stress stiffness.
-    """
-    if theory.exact or (theory.linear and theory.prestress):
-        return None
-    richer = stiffened() if theory.linear else richest()
-    holds = richer.holds_for(structure) and (not theory.linear or structure in richer.prestress)
-    return richer if holds else None
 
 
 def _measured_in(order: str) -> dict[str, Strains]:
@@ -99,13 +74,12 @@ def _measured_in(order: str) -> dict[str, Strains]:
 
 _LINEAR, _SECOND_ORDER, _VON_KARMAN = (_measured_in(name) for name in ("linear", "second_order", "von_karman"))
 
-# The nonlinear theories of moderate rotation cost what the exact one costs, so it does not have them as cheaper ones.
 for _theory in (
     Theory("linear", 0, _LINEAR, linear=True, quick=True),
-    Theory("consistent_linear", 1, _LINEAR, linear=True, prestress=_SECOND_ORDER, poorer=("linear",), quick=True),
-    Theory("von_karman_linear", 2, _LINEAR, linear=True, prestress=_VON_KARMAN, poorer=("linear",)),
-    Theory("second_order", 3, _SECOND_ORDER, poorer=("linear", "consistent_linear")),
-    Theory("von_karman", 4, _VON_KARMAN, poorer=("linear", "von_karman_linear")),
-    Theory("reissner", 5, _measured_in("reissner"), exact=True, poorer=("linear", "consistent_linear"), quick=True),
+    Theory("consistent_linear", 1, _LINEAR, linear=True, prestress=_SECOND_ORDER, quick=True),
+    Theory("von_karman_linear", 2, _LINEAR, linear=True, prestress=_VON_KARMAN),
+    Theory("second_order", 3, _SECOND_ORDER),
+    Theory("von_karman", 4, _VON_KARMAN),
+    Theory("reissner", 5, _measured_in("reissner"), exact=True, quick=True),
 ):
     register(_theory)

@@ -64,7 +64,6 @@ class Newton:
             slender, on the way to the right root too; but that it is close to the start is no argument for it then.
         wandered: whether an increment after the first of the last solve was beyond where its tangent says anything.
         roundoff: largest increment accepted because it had stopped shrinking at round-off level.
-        foreseeing: whether later increments, too, may be the last because the next would be below tolerance.
     """
 
     tolerance: float = 1e-9
@@ -73,7 +72,6 @@ class Newton:
     diverging: bool = False
     wandered: bool = False
     roundoff: float = 0.0
-    foreseeing: bool = False
     _kappa: float = field(default=np.inf, repr=False)
     _longest: float = field(default=0.0, repr=False)
 
@@ -113,7 +111,7 @@ class Newton:
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 factor.judge(d, enough)
-            elif d <= self.tolerance or ((k == 1 or self.foreseeing) and self._successor(d) <= self.tolerance):
+            elif d <= self.tolerance or (k == 1 and self._successor(d) <= self.tolerance):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander

@@ -19,7 +19,6 @@ from mpi4py import MPI
 from rotfem.mechanics.bodies import Body, RootSpring, Strain
 from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.forms import quadrature_points
 from rotfem.places import ONE, apart
 from rotfem.structures.mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
@@ -106,25 +105,6 @@ class Beam(Structure):
     def stretch(self, strains: list[Strain]) -> Any:
         """Return 1 + Γ₁, Γ₁ the axial strain."""
         return 1 + next(s.value for s in strains if s.name == "axial")
-
-    def hardly_moved(self) -> bool:
-        """Return whether the state in q is surely not inside out, as far as this process sees without compiling.
-
-        Every theory's 1 + Γ₁ is at least about cos α − |u'|, and rotation and slope are small at all quadrature points.
-        """
-        if self.turns is not None and self.turns.reference is not None:
-            return False
-        basis, cells = self.V.element.basix_element, np.arange(self.mesh.topology.index_map(1).size_local)
-        at, by_x = basis.tabulate(1, quadrature_points(self.mesh, basis.degree))[..., 0]
-        nodes = self.k.functions[0].x.array.reshape(-1, len(self.unknowns))[self.V.dofmap.list[cells]]
-        values = np.einsum("pn,cni->cpi", at, nodes)
-        slopes = np.einsum("pn,cni->cpi", by_x, nodes) / self.mesh.h(1, cells.astype(np.int32))[:, None, None]
-        moves = np.array([name.startswith("u") for name in self.unknowns])
-        largest = (
-            float(np.linalg.norm(x, axis=2).max(initial=0.0))
-            for x in (values[..., ~moves], slopes[..., moves], self.length * slopes[..., ~moves] / 10)
-        )
-        return all(size < 0.4 for size in largest)  # rad and slope, far below what turns a beam inside out
 
     def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
         """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""

@@ -273,10 +273,6 @@ class Structure(Loaded):
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
         raise NotImplementedError
 
-    def hardly_moved(self) -> bool:
-        """Return whether the state in q is surely not inside out, as far as this process sees without compiling."""
-        return False
-
     def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
         """Return the strains of one theory's measures with the stiffness of the structure."""
         raise NotImplementedError

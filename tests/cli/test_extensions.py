@@ -204,16 +204,3 @@ def test_what_is_registered_fails_later(rotfem: Rotfem, folder: Path, content: s
     assert done.status == 2
     assert done.err.startswith(f"rotfem: {message}")
     assert done.err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("class M(rotfem.MotionLaw):\n name = 'm'", "M lacks speed"),
-        ("class S(rotfem.Scheme):\n name = 'm'\n stage = finish = None", "S lacks order"),
-    ],
-)
-def test_classes_that_are_not_complete(rotfem: Rotfem, folder: Path, content: str, message: str) -> None:
-    (folder / "mine.py").write_text(f"import rotfem\n{content}\nrotfem.register({content[6]})\n")
-    done = rotfem("--load", "mine.py", "check", "beam.toml", "-o", "out")
-    assert (done.status, message in done.err) == (2, True)

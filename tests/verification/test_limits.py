@@ -17,8 +17,8 @@ from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import smooth_spin_up
-from rotfem.mechanics.theories import ladder
 from rotfem.numerics.newton import Newton
+from rotfem.registry import theories
 
 Array = npt.NDArray[np.float64]
 
@@ -167,7 +167,7 @@ def test_weight_of_beam_and_tip_mass(unit_beam: Any) -> None:
 # --- rotation --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ladder())
+@pytest.mark.parametrize("theory", theories.names)
 def test_spinning_rod(spin_up: Any, theory: str) -> None:
     """u1(L) = tan(kL)/k − L, k = Ω √(A_rho/EA), exact."""
     speed = 100.0
