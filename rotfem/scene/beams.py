@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
@@ -32,6 +31,8 @@ from rotfem.scene.values import (
     Span,
     Vector,
     check_profile_length,
+    check_span,
+    check_start,
     on_span,
     symmetric,
 )
@@ -81,7 +82,6 @@ class BeamStructure(StructureTable):
     """What planar and spatial beams share; a planar one is clamped at (hub_radius, 0, 0) of the frame.
 
     Attributes:
-        type: which of them.
         length: from the clamp to the tip, along the axis (m).
         hub_radius: distance of the clamp from the axis of rotation, or from the origin, along direction 1 (m).
         tip_mass: mass at the free end (kg).
@@ -150,7 +150,6 @@ class PlanarBeamStructure(BeamStructure):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
     Attributes:
-        type: "planar_beam".
         tip_inertia: moment of inertia of the tip mass about axis 3 (kg·m²).
         section: cross-section.
         root: hinge, spring and damper at the clamp.
@@ -171,18 +170,6 @@ class PlanarBeamStructure(BeamStructure):
         self._check_tables()
 
 
-def _check_sweep(rows: Any) -> Any:
-    """Return a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
-    if isinstance(rows, tuple):
-        x = [row[0] for row in rows]
-        times = Counter(x)
-        if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or max(times.values()) > 2 or times[x[0]] + times[x[-1]] > 2:
-            raise problem(
-                "", None, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink"
-            )
-    return rows
-
-
 Line = Annotated[tuple[Vector, ...], AfterValidator(as_line), FROM_FILE, unit("m")]
 
 
@@ -190,7 +177,6 @@ class SpatialBeamStructure(BeamStructure):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:
-        type: "spatial_beam".
         hub_offset: position of the clamp in the frame (m), instead of the hub radius; None if not given.
         tip_inertia: its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
         tip_offset: position of its center relative to the end of the axis, in section axes (m).
@@ -214,7 +200,7 @@ class SpatialBeamStructure(BeamStructure):
     tip_offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
     section: SpatialSection
     pretwist: Annotated[Profile[Number], along("rad")] = 0.0
-    sweep: Annotated[Span[Number], AfterValidator(_check_sweep), along("rad")] = 0.0
+    sweep: Annotated[Span[Number], AfterValidator(check_span), AfterValidator(check_start), along("rad")] = 0.0
     line: Line | None = None
     precone: Annotated[Number, unit("rad")] = 0.0
     root: SpatialRoot = empty()

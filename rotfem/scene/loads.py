@@ -8,14 +8,13 @@ from __future__ import annotations
 import inspect
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationInfo, field_validator
 
 from rotfem.scene.files import is_path, read_rows
 from rotfem.scene.table import LISTED, SceneModel, in_units, problem, problems_at, unit
-from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, on_span
+from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, check_span, on_span
 
 
 def arguments(function: Callable[..., Any]) -> int:
@@ -49,20 +48,6 @@ _ROWS = TypeAdapter(Rows, config=ConfigDict(defer_build=True))
 def are_rows(value: Any) -> bool:
     """Return whether a value is a list of lists, or the path of a file of rows."""
     return is_path(value) or (isinstance(value, list | tuple) and bool(value) and isinstance(value[0], list | tuple))
-
-
-def check_span(rows: Matrix) -> Matrix:
-    """Return rows (x, …); refuse x (m) that decreases, or does not change; one x may stand in two of them: a jump."""
-    x = [row[0] for row in rows]
-    if len(rows) < 2 or x[0] == x[-1]:
-        raise problem("", None, "must have at least two rows at different x")
-    for i, (before, after) in enumerate(pairwise(x), start=2):
-        if after < before:
-            raise problem("", None, f"the first column must not decrease; row {i}: {after:g} < {before:g}")
-    place, times = Counter(x).most_common(1)[0]
-    if times > 2:
-        raise problem("", None, f"x = {place:g} stands in {times} rows; must be in one, or in two, where it jumps")
-    return rows
 
 
 def check_grid(rows: Matrix) -> Matrix:
@@ -228,10 +213,8 @@ class LoadTable(Signal):
     """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
 
     Attributes:
-        value: constant components, or None.
         table, over_time: rows (t, components), linear between them and constant outside, or None; `over_time` also a
             function.
-        function: Python function t (s) ↦ components, or None.
         kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
         harmonic: harmonic terms, added to the rest, or alone.
     """

@@ -40,7 +40,6 @@ class PlateStructure(StructureTable):
     """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
 
     Attributes:
-        type: "plate".
         length: side along x (m); None with a mesh.
         width: side along y (m); None with a mesh.
         mesh: path of a gmsh file with the physical groups "clamped" and "plate", or None.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -20,6 +19,7 @@ from rotfem.scene.values import (
     Positive,
     WithParameters,
     check_increasing,
+    increasing,
     on_span,
     parameters_of,
 )
@@ -291,12 +291,6 @@ class Time(WithParameters):
             raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
 
 
-def _increasing_pair(speeds: tuple[float, float]) -> tuple[float, float]:
-    if not speeds[0] < speeds[1]:
-        raise problem("", None, "must be two speeds that increase")
-    return speeds
-
-
 class ModesTable(SceneModel):
     """The [modes] table.
 
@@ -313,7 +307,7 @@ class ModesTable(SceneModel):
     about: Literal["steady", "undeformed"] = "steady"
     orders: Annotated[tuple[Count, ...], AfterValidator(lambda orders: tuple(sorted(set(orders))))] | None = None
     rated: Annotated[Positive, unit("rad/s")] | None = None
-    operating: Annotated[tuple[NonNegative, NonNegative], AfterValidator(_increasing_pair), unit("rad/s")] | None = None
+    operating: Annotated[tuple[NonNegative, NonNegative], AfterValidator(increasing), unit("rad/s")] | None = None
 
 
 class Solver(SceneModel):
@@ -337,16 +331,10 @@ def _as_quantities(value: Any) -> tuple[str, ...]:
     return as_names(value, (*registry.outputs.names, *sections), "an output")
 
 
-def _increasing(places: tuple[float, ...]) -> tuple[float, ...]:
-    if not places or any(b <= a for a, b in pairwise(places)):
-        raise problem("", None, "must be positions that increase")
-    return places
-
-
 #: Positions that increase, or how many there are.
 Stations = Annotated[
     Annotated[int, Field(strict=True, ge=2, le=10_000), Tag("<one>")]
-    | Annotated[tuple[Number, ...], AfterValidator(_increasing), Tag("<rows>")],
+    | Annotated[tuple[Number, ...], AfterValidator(increasing), Tag("<rows>")],
     BY_SHAPE,
     unit("m"),
 ]

@@ -217,14 +217,7 @@ BY_SHAPE = Discriminator(lambda value: "<rows>" if isinstance(value, list | tupl
 
 @dataclass(frozen=True)
 class Way:
-    """A complete set of keys, of which a table must hold exactly one.
-
-    Attributes:
-        name: what the set is called.
-        required: keys that must be given.
-        optional: keys that may be given.
-        shape: value the key `shape` must have, if it is among the required ones.
-    """
+    """A complete set of keys, of which a table must hold exactly one, and the value of the key `shape` in it."""
 
     name: str
     required: tuple[str, ...]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
@@ -66,6 +67,29 @@ def check_increasing(rows: Any) -> Any:
         if after <= before:
             raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} ≤ {before:g}")
     return rows
+
+
+def check_span(rows: Any) -> Any:
+    """Return rows (x, …); refuse x (m) that decreases, or does not change; one x may stand in two of them: a jump."""
+    if isinstance(rows, float):
+        return rows
+    x = [row[0] for row in rows]
+    if len(rows) < 2 or x[0] == x[-1]:
+        raise problem("", None, "must have at least two rows at different x")
+    for i, (before, after) in enumerate(pairwise(x), start=2):
+        if after < before:
+            raise problem("", None, f"the first column must not decrease; row {i}: {after:g} < {before:g}")
+    place, times = Counter(x).most_common(1)[0]
+    if times > 2:
+        raise problem("", None, f"x = {place:g} stands in {times} rows; must be in one, or in two, where it jumps")
+    return rows
+
+
+def increasing(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Return numbers that increase strictly; refuse others, and none."""
+    if not values or any(b <= a for a, b in pairwise(values)):
+        raise problem("", None, "must be numbers that increase")
+    return values
 
 
 def check_start(rows: Any) -> Any:

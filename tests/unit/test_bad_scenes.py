@@ -89,6 +89,7 @@ time={end=1.0, step=0.1, beta=0.3} -> @time.beta no meaning
 time={end=1.0, step=0.1, scheme='newmark', gamma=0.4} -> @time.gamma at least 0.5
 time={end=1.0, step=0.1, scheme='newmark', beta=0} -> @time.beta greater than 0
 time={end=1.0, step=0.1, output_every=0} -> @time.output_every at least 1
+time={end=1.0, step=0.1, scheme='rk4'} -> @time.scheme "generalised_alpha", "newmark", "energy_conserving", "esdirk4"
 modes.count=0 -> at least 1
 modes.about='deformed' -> "undeformed"
 structure.section.EA=[] -> at least two rows
@@ -135,7 +136,9 @@ structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
 structure.section.EA=nofile.csv -> file not found
 time={end=1.0, step=1e-20} -> @time.step round-off
+structure.section.from='x.dat' -> only of a spatial_beam
 [spatial]
+structure.section.format='hawc2' -> no meaning without section.from
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
 structure.pretwist=[[0,0],[1,1]] -> it ends at 1

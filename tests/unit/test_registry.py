@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-import tomli_w
 
 import rotfem.scene
 from rotfem import registry
@@ -173,13 +172,6 @@ def test_names_are_valid_values_until_they_are_removed(add: Add) -> None:
         assert "allowed: " in message or "none are registered" in message
 
 
-def test_what_a_user_registered_is_suggested(add: Add) -> None:
-    add(Theory("cubic_curvature", 3.5, {"planar_beam": strains}))
-    message = refusal(model={"theory": "cubic_curvatur"})
-    assert 'did you mean "cubic_curvature"? allowed: "linear", ' in message
-    assert message.endswith(', "reissner", "cubic_curvature"')
-
-
 def test_a_scene_is_validated_without_fenicsx() -> None:
     """The registries are read then; what their entries compute with is not."""
     code = (
@@ -261,13 +253,6 @@ def test_bad_parameters_of_a_scheme(add: Add, changes: dict[str, Any], message: 
     assert message in refusal(time={"end": 1, "step": 0.1, "scheme": "damped"} | changes)
 
 
-def test_parameters_of_a_scheme_that_is_gone_are_unknown_keys(add: Add) -> None:
-    table = {"end": 1, "step": 0.1, "decay": 0.5}
-    assert "time.decay: unknown key" in refusal(time=table)
-    add(Damped)
-    assert 'time.decay = 0.5: has no meaning with scheme = "generalised_alpha"' in refusal(time=table)
-
-
 def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
     add(Damped)
     add(Estimated)
@@ -293,13 +278,6 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
     assert "cannot have a parameter tolerance, which is a key of the table already" in message
 
 
-@pytest.mark.parametrize("scheme", ["rk4", 4, ["newmark"], {"name": "newmark"}])
-def test_unknown_schemes(scheme: Any) -> None:
-    message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
-    assert message.startswith("test.toml: time.scheme")
-    assert 'allowed: "generalised_alpha", "newmark", "energy_conserving", "esdirk4"' in message
-
-
 # --- section shapes -------------------------------------------------------------------------------------------------
 
 ELLIPSE = Shape("ellipse", dimensions=("semi_axis_2", "semi_axis_3"), geometry=ellipse)
@@ -320,47 +298,6 @@ def test_a_shape_of_ones_own_in_both_sections(add: Add) -> None:
     stiffness = np.diag(spatial.section.at(0.0)["stiffness"])
     torsion = 84e9 * np.pi * 0.02**3 / 0.05
     np.testing.assert_allclose(stiffness[3:], [torsion, 210e9 * second, 210e9 * 4 * second])
-
-
-def test_dimensions_of_a_shape_of_ones_own_may_be_tapers(add: Add) -> None:
-    add(ELLIPSE)
-    asked = scene(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [0.5, 0.2], [2, 0.2]]}))
-    section: Any = asked.structure.section  # type: ignore[union-attr]
-    assert (section.knots[1:-1], section.uniform) == ([0.5], False)
-    np.testing.assert_allclose(section.at(0.25)["EI"], 210e9 * np.pi * 0.2 * 0.15**3 / 4)
-    assert asked.to_dict()["structure"]["section"]["semi_axis_3"] == [[0.0, 0.1], [0.5, 0.2], [2.0, 0.2]]
-    assert "it ends at 1" in refusal(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [1, 0.2]]}))
-
-
-def test_a_shape_of_ones_own_in_a_file(add: Add, tmp_path: Path) -> None:
-    tables = {"structure": beam(**AXES), "motion": {"type": "constant", "speed": 1.0}}
-    (tmp_path / "beam.toml").write_text(tomli_w.dumps(tables))
-    with pytest.raises(SceneError, match='structure.section.shape = "ellipse": allowed: '):
-        rotfem.load_scene(tmp_path / "beam.toml")
-    add(ELLIPSE)
-    loaded = rotfem.load_scene(tmp_path / "beam.toml", ["structure.section.semi_axis_2=0.3"])
-    assert loaded.to_dict()["structure"]["section"]["semi_axis_2"] == 0.3
-    assert Scene.from_dict(loaded.to_dict()).to_dict() == loaded.to_dict()
-
-
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ({"shape": "ellipse", "semi_axis_2": 0.2}, "not a complete set of keys: missing semi_axis_3; give exactly one"),
-        (AXES | {"radius": 1}, "radius cannot be combined with the rest"),
-        (AXES | {"semi_axis_2": 0}, "structure.section.semi_axis_2 = 0: must be greater than 0"),
-        (AXES | {"semi_axis_2": [[0, 1], [2, -1]]}, "semi_axis_2.1.1 = -1: must be greater than 0"),
-        (AXES | {"semi_axis_2": "wide"}, 'semi_axis_2 = "wide": file not found'),
-        (
-            AXES | {"semi_axes_2": 1},
-            'structure.section.semi_axes_2: unknown key; did you mean "semi_axis_2"? allowed: E',
-        ),
-        ({"shape": "elipse"}, 'did you mean "ellipse"? allowed: "rectangle", "circle", "tube", "ellipse"'),
-    ],
-)
-def test_bad_dimensions_of_a_shape(add: Add, section: dict[str, Any], message: str) -> None:
-    add(ELLIPSE)
-    assert message in refusal(structure=beam(**section))
 
 
 def test_a_shape_may_have_alternatives_and_a_check_of_its_own(add: Add) -> None:
