@@ -73,10 +73,6 @@ class PointMass(SceneModel):
         """Inertia tensor (kg·m²), shape (3, 3)."""
         return _as_matrix(self.inertia)
 
-    def _check(self) -> None:
-        if self.mass == 0.0 and not np.any(self.inertia_matrix):
-            raise problem("mass", self.mass, "give mass, inertia, or both")
-
 
 class BeamStructure(StructureTable):
     """What planar and spatial beams share; a planar one is clamped at (hub_radius, 0, 0) of the frame.

@@ -334,10 +334,6 @@ class PointLoad(SceneModel):
     moment: MomentTable | None = None
     kind: Kind = "dead"
 
-    def _check(self) -> None:
-        if self.force is None and self.moment is None:
-            raise problem("force", None, "give force, moment, or both")
-
 
 class LoadsTable(SceneModel):
     """The [loads] table.

@@ -119,7 +119,6 @@ loads={tip_force={over_span=[[0,0,0],[5,0,1]]}} -> unknown key
 loads={pressure=1.0} -> needs a plate
 loads={at=[{x=10.1, force=[0,1]}]} -> from 0 to the length
 loads={at=[{x=[1,2], force=[0,1]}]} -> must be a number
-loads={at=[{x=1.0}]} -> force, moment, or both
 loads={at=[{x=1.0, moment=[0,0,1]}]} -> one component
 loads={at={x=1.0, force=[0,1]}} -> must be a list
 loads={tip_force={harmonic={amplitude=[0,1]}}} -> frequency and per_rev
@@ -134,18 +133,17 @@ structure.damping.modal={lag=[0.1,1.0]} -> @structure.damping.modal.lag.1 less t
 loads.tip_force.harmonic={amplitude=['a',1], frequency=1} -> @loads.tip_force.harmonic.0.amplitude must be a number
 structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
-structure.section.EA=nofile.csv -> file not found
 time={end=1.0, step=1e-20} -> @time.step round-off
-structure.section.from='x.dat' -> only of a spatial_beam
+structure.section.EA=nofile.csv -> file not found
+structure.section.from='x.dat' -> unknown key
 [spatial]
-structure.section.format='hawc2' -> no meaning without section.from
+structure.section.format='hawc2' -> unknown key
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
 structure.pretwist=[[0,0],[1,1]] -> it ends at 1
 structure.section.precone='a' -> must be a number
 structure.precone=0.1; structure.section.precone=0.1 -> given twice
 structure.hub_radius=1; structure.hub_offset=[1,0,0] -> either
-structure.supports=[{x=0}] -> @structure.supports.0.stiffness give stiffness
 structure.section.mass_center=[0.1] -> more entries
 structure.line=[[0,0,0],[1,0,0]]; structure.length=3 -> @structure.length arc length
 structure.tip_inertia=[[1,2],[2,1]] -> symmetric 3×3
