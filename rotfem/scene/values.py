@@ -184,9 +184,10 @@ def evaluate(value: Any, x: npt.ArrayLike) -> Array:
     return np.asarray(values.reshape((*positions.shape, *entries.shape[1:])))
 
 
-def on_span(x: float, length: float | None) -> bool:
-    """Return whether x (m) is from 0 to the length of a structure, but for round-off; True if that is not known."""
-    return length is None or -ROUND_OFF <= x / length <= 1 + ROUND_OFF
+def check_on_span(key: str, x: float, length: float | None) -> None:
+    """Refuse a place x (m) beside a structure of a length (m), but for round-off; none is where that is not known."""
+    if length is not None and not -ROUND_OFF <= x / length <= 1 + ROUND_OFF:
+        raise problem(key, x, f"must be from 0 to the length {length:g}")
 
 
 def check_profile_length(key: str, profile: float | Matrix, length: float, slack: float = ROUND_OFF) -> None:

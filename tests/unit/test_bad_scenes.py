@@ -108,7 +108,7 @@ structure.section={E=2e11, nu=0.3, rho=7800, shape='tube', outer_radius=1, inner
 structure.section={E=1, nu=0, rho=1, shape='tube', outer_radius=[[0,2],[10,1]], inner_radius=1.5} -> outer_radius
 structure.section={E=2e11, nu=0.6, rho=7800, shape='circle', radius=1} -> at most 0.5
 structure.section={E=2e11, nu=0.3, rho=7800, shape='circel', radius=1} -> did you mean "circle"
-loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> x = 11
+loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> @loads.distributed.over_span 11.0: must be from 0 to the length
 loads={distributed={over_span=[[0,0],[10,1]]}} -> row 1 has 2 entries
 loads={distributed={over_span=[[0,0,0],[5,0,1]], value=[0,1]}} -> exactly one of
 loads={distributed={over_span=[[0,0,0],[5,0,1],[4,0,1]]}} -> row 3: 4 < 5
@@ -159,7 +159,7 @@ structure.E1=1000000000.0 -> @structure cannot be combined
 structure.thickness={skin=0.1} -> needs a mesh
 structure.thickness=[[0,0.1],[1,0]] -> @structure.thickness.1.1 greater than 0
 structure.mesh='no.msh' -> file not found
-structure.point_masses=[[2,0,1]] -> not on the plate
+structure.point_masses=[[2,0,1]] -> @structure.point_masses.0.0 from 0 to the length
 structure.line_masses={tip=0} -> @structure.line_masses.tip greater than 0
 structure.line_masses=1.0 -> must be a table
 """
