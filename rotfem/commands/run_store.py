@@ -31,6 +31,7 @@ from rotfem.analysis.march import March
 from rotfem.analysis.schemes import State
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import computing
 from rotfem.results.files import write_whole
@@ -66,7 +67,7 @@ class Memory:
     """The parts of a run that a checkpoint is of; without a march nothing can be kept."""
 
     time: Time
-    system: Any
+    system: System
     march: March | None
     record: Recorder
     monitor: Monitor
