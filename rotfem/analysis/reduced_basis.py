@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ from numpy.linalg import norm
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, product
+from rotfem.equations.affine import AffineSystem
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
 from rotfem.numerics.linear import ROUNDED, unknown_scale
@@ -229,7 +230,7 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
 
     def model() -> SpeedModel:
         # Orthonormal in the inertia instead, directions that have none would be lost.
-        V = orthonormal(analysis.comm, np.hstack(columns), lambda X: times(system.material, X))
+        V = orthonormal(analysis.comm, np.hstack(columns), lambda X: times(cast(AffineSystem, system).material, X))
         nodes = (first, 0.5 * (first + last), last)
         return SpeedModel(V, ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in nodes), False, count)
 
