@@ -30,7 +30,7 @@ class Fault(NamedTuple):
         allowed = "\n".join(map(printable, self.allowed.split("\n")))
         if not self.key:
             return allowed
-        key = printable(self.key, _LONGEST_VALUE)
+        key = printable(_cut(self.key, _LONGEST_VALUE))
         return f"{key}: {allowed}" if self.value is None else f"{key} = {show(self.value)}: {allowed}"
 
 
@@ -137,8 +137,7 @@ class OutputError(OSError):
 
     def __init__(self, path: object, reason: str) -> None:
         super().__init__(path, reason)
-        self.path = path
-        self.reason = reason
+        self.path, self.reason = path, reason
 
     def __str__(self) -> str:
         return f"output {self.path}: cannot be written: {self.reason}; choose another folder with -o DIR"
@@ -150,10 +149,8 @@ def show(value: Any) -> str:
     return text if isinstance(value, Path) else _cut(text, _LONGEST_VALUE)
 
 
-def printable(text: str, longest: int | None = None) -> str:
-    """Return a text in one line, without characters that steer a terminal; cut to a length if that is given."""
-    if longest is not None:
-        text = _cut(text, longest)
+def printable(text: str) -> str:
+    """Return a text in one line, without characters that steer a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -174,7 +171,4 @@ def _full_text(value: Any) -> str:
         return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_full_text, value[:_LONGEST_VALUE]))}]"
-    try:
-        return " ".join(repr(value).split())
-    except (ValueError, RecursionError):  # integers of thousands of digits, tables of thousands of levels
-        return f"<{type(value).__name__}>"
+    return " ".join(repr(value).split())

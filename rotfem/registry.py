@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from inspect import get_annotations
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 
@@ -41,7 +40,6 @@ class Registry(Generic[E]):
     def add(self, entry: E) -> None:
         """Add an entry."""
         self._load()
-        _check_class(entry)
         if not isinstance(entry.name, str) or not entry.name.isidentifier():
             raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
         if entry.name in self._entries:
@@ -59,13 +57,10 @@ class Registry(Generic[E]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names, in order: the package's own as their homes are listed, whichever was imported first."""
+        """All names: of several homes in the order of these, whichever was imported first."""
         self._load()
-        return tuple(sorted(self._entries, key=self._rank))
-
-    def _rank(self, name: str) -> int:
-        home = self._entries[name].__module__
-        return self._order.index(home) if home in self._order else len(self._order)
+        order = {home: place for place, home in enumerate(self._order)}
+        return tuple(sorted(self._entries, key=lambda name: order.get(self._entries[name].__module__, len(order))))
 
     def __getitem__(self, name: str) -> E:
         self._load()
@@ -76,19 +71,6 @@ class Registry(Generic[E]):
 
     def __iter__(self) -> Iterator[E]:
         return iter([self._entries[name] for name in self.names])
-
-
-def _check_class(entry: Any) -> None:
-    """Refuse a class with abstract methods, without the attributes of its kind, or with fields but no dataclass."""
-    if not isinstance(entry, type) or hasattr(entry, "model_fields"):  # pydantic checks the tables of a scene
-        return
-    declared = {name: hint for base in entry.__mro__ for name, hint in get_annotations(base).items()}
-    missing = [name for name, hint in declared.items() if "ClassVar" in str(hint) and not hasattr(entry, name)]
-    if absent := sorted({*missing, *getattr(entry, "__abstractmethods__", ())}):
-        raise TypeError(f"{entry.__name__} lacks {', '.join(absent)}")
-    fields = any("ClassVar" not in str(hint) for hint in get_annotations(entry).values())
-    if fields and "__dataclass_fields__" not in vars(entry):
-        raise TypeError(f"{entry.__name__} must be a dataclass: its fields are its parameters")
 
 
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
@@ -119,7 +101,7 @@ def register(entry: Entry | type[Entry]) -> None:
             `Scheme` or `MotionLaw`.
 
     Raises:
-        TypeError: it is none of these, or a class that is not complete.
+        TypeError: it is none of these.
         ValueError: its name is taken, or no name.
     """
     registry = getattr(entry, "registry", None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -41,12 +41,10 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
 
     def at(*arguments: Any) -> Array:
         try:
-            given = function(*arguments)
-            value: Array = np.array(given, dtype=np.float64, ndmin=1).ravel()
-        except (TypeError, ValueError) as error:
-            raise _refused(key, of, arguments, f"must return {needed}: {error}") from error
+            value: Array = np.array(function(*arguments), dtype=np.float64, ndmin=1).ravel()
         except Exception as error:
-            raise _refused(key, of, arguments, f"raised {type(error).__name__}: {error}") from error
+            why = f"must return {needed}; raised {type(error).__name__}: {error}"
+            raise _refused(key, of, arguments, why) from error
         if value.size == 2 and size == 3:
             value = np.array([value[0], value[1], 0.0])
         if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
@@ -63,13 +61,5 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
 
 
 def _refused(key: str, of: str, arguments: tuple[Any, ...], why: str) -> InputError:
-    return InputError(key, None, f"the function of {of}, at {', '.join(map(_shown, arguments))}, {why}")
-
-
-def _shown(argument: Any) -> str:
-    """Return an argument of a function as errors show it."""
-    if isinstance(argument, tuple):
-        return f"({', '.join(map(_shown, argument))})"
-    if isinstance(argument, Mapping):
-        return "{" + ", ".join(f"{name}: {_shown(value)}" for name, value in argument.items()) + "}"
-    return f"{argument if abs(argument) > 1e-300 else 0.0:g}"
+    at = ", ".join(f"{x:g}" if isinstance(x, float | int) else str(x) for x in arguments)
+    return InputError(key, None, f"the function of {of}, at {at}, {why}")

@@ -27,6 +27,7 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import massed
+from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
@@ -181,14 +182,14 @@ class ModalAnalysis:
         about: str = "steady",
         newton: Newton | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
-        system: Any = None,
+        system: System | None = None,
     ):
         started = perf_counter()
         #: Whether modes are those in the fixed frame.
         self.fixed = problem.frame == "fixed"
         self.problem = problem if self.fixed else problem.replace(frame="rotating")
         self.about, self.comm = about, comm
-        self.system: Any = compile_system(self.problem, comm, moving=False) if system is None else system
+        self.system = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None

@@ -63,17 +63,22 @@ class Simulation:
         clock: called with the number of steps and the part of the history that is done.
         times: rows (s) at which the output alone is wanted, to be compared, and the rest when `result` asks for it;
             None for the rows of the scene, each with all that a history has.
+        progress: called with the part of the history that is done.
     """
+
+    #: There is no bound of the error by round-off; a warning says where it is large.
+    round_off = None
 
     def __init__(
         self,
         scene: Scene,
         problem: ProblemData,
         store: RunStore,
-        clock: Callable[[int, float], None] | None = None,
+        clock: Callable[[int, float], None] = lambda steps, share: None,
         times: Array | None = None,
+        progress: Progress = lambda share: None,
     ):
-        self.scene, self.clock, self.times = scene, clock, times
+        self.scene, self.clock, self.times, self.progress = scene, clock, times, progress
         self.comm, self.store, self.log = store.comm, store, Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
@@ -81,20 +86,17 @@ class Simulation:
         if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
-        self.system: Any = compile_system(problem, there, moving=scene.time is not None)
+        self.system = compile_system(problem, there, moving=scene.time is not None)
         if times is None:
             self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
         self.monitor = Monitor(self.system, critical_speed(self.system) if times is None else None)
         self.iteration = Newton.of(scene.solver)
-        self.start = Start()
-        #: What the states came from: of a history its march and rows between steps.
+        #: What the states of a history came from, and rows between its steps.
         self.march: March | None = None
         self.rows: RowTimes | None = None
-        self.last: State | None = None
-        self.shape: Array | None = None
-        #: Legs of all steps; the output at the rows so far, and states of rows whose other values wait to be asked for.
+        #: The output at the rows so far, and states of rows whose other values wait to be asked for.
         self._output = OUTPUTS[output_of(scene)]
         self._values = list[Array]()
         self._waiting = list[State]()
@@ -123,18 +125,17 @@ class Simulation:
         """Coordinates (m) of the vertices of the mesh along each axis."""
         return lines(self.system)
 
-    @property
-    def round_off(self) -> None:
-        """There is no bound of the error by round-off; a warning says where it is large."""
-        return None
-
     def compute(self) -> Simulation:
-        """Compute the output at the rows, and nothing else; return this."""
-        if self.scene.time is None:
+        """Compute the rows; return this."""
+        time, start = self.scene.time, Start()
+        if time is None:
             self._steady()
-        else:
-            self.start = self._start(self.system)
-            self._march(self.scene.time, lambda share: None)
+            return self
+        if not self.store.goes_on:
+            start = first_state(self.scene, self.problem, self.system, judged=self.times is None)
+        self.monitor.stability = start.stability
+        self.log.warnings += start.warnings
+        self._march(time, start)
         return self
 
     def result(self) -> RunResult:
@@ -147,17 +148,10 @@ class Simulation:
             self._waiting = []
         return self.summarised("done")
 
-    def run(self, progress: Progress | None = None) -> RunResult:
+    def run(self) -> RunResult:
         """Return the result of the scene (see `rotfem.run`)."""
-        progress = progress or (lambda share: None)
         try:
-            if self.scene.time is None:
-                self._steady()
-            else:
-                self.start = Start() if self.store.goes_on else self._start(self.system)
-                self.monitor.stability = self.start.stability
-                self.log.warnings += self.start.warnings
-                self._march(self.scene.time, progress)
+            return self.compute().result()
         except ComputationError as error:
             failure = self._with_cause(error)
             failure.result = self.summarised("failed", failure)
@@ -166,7 +160,6 @@ class Simulation:
             if not together(self.comm, stop):
                 raise
             raise Stopped(self.summarised("interrupted")) from stop
-        return self.summarised("done")
 
     # --- what yields states -----------------------------------------------------------------------------------------
 
@@ -174,14 +167,11 @@ class Simulation:
         """Compute the equilibrium at the speed of t = 0."""
         system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
         log.warnings += frozen_inputs(self.problem)
-        self.shape = steady_state(system, speed, self.iteration, notes=log.warnings)
-        stability = self.monitor.stability = stability_of(system, self.shape, speed)
-        if self.times is not None:
-            self._sampled(State.at_rest(system, *system.start(self.shape)))
-            return
-        self._recorded(State.at_rest(system, *system.start(self.shape)))
+        shape = steady_state(system, speed, self.iteration, notes=log.warnings)
+        stability = self.monitor.stability = stability_of(system, shape, speed)
+        self._row(State.at_rest(system, *system.start(shape)))
         critical = self.monitor.critical
-        if said := stability.warning():
+        if self.times is None and (said := stability.warning()):
             if critical is not None and abs(speed) > critical:
                 said += (
                     f"; {speed_text(abs(speed))} is above the speed {speed_text(critical)} at which the "
@@ -189,11 +179,10 @@ class Simulation:
                 )
             log.warnings.append(said)
 
-    def _march(self, time: Time, progress: Progress) -> None:
+    def _march(self, time: Time, start: Start) -> None:
         """March through the history."""
-        scheme, newton = scheme_of(time), self.iteration
-        march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
-        self.march = march
+        scheme = scheme_of(time)
+        march = self.march = March(self.system, scheme, Steps.of(time), self.iteration, start.q, start.v)
         march.reached = self.store.start(self._memory())
         times = self.times if time.output_step is None else multiples(time.output_step, time.end)
         if times is not None:
@@ -204,40 +193,35 @@ class Simulation:
         with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
-                self._stepped(state, time, progress)
-
-    def _start(self, system: Any) -> Start:
-        """Return what the history starts from in a system, which may be of another mesh or theory."""
-        there = system.model.problem
-        problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
-        return first_state(self.scene, problem, system, judged=system is self.system and self.times is None)
+                self._stepped(state, time)
 
     # --- what sees them ---------------------------------------------------------------------------------------------
 
     def _leg(self, old: State, new: State) -> None:
         self.log.parts += 1
 
-    def _sampled(self, state: State) -> None:
-        """Take the output of a row; the rest of it waits."""
-        self._values.append(self._output(self.system, state))
-        self._waiting.append(state)
-
-    def _stepped(self, state: State, time: Time, progress: Progress) -> None:
+    def _stepped(self, state: State, time: Time) -> None:
         """Show a state of the march to all that observe it."""
         steps = self.log.steps
         self.monitor.step(state)
-        self.last = state
         rows = [state]
         if self.rows is not None and state.t > 0.0:
             rows = self.rows.taken()
         elif steps % time.output_every and state.t < time.end * (1 - 1e-9):
             rows = []
         for row in rows:
-            (self._recorded if self.times is None else self._sampled)(row)
-            progress(row.t / time.end)
+            self._row(row)
+            self.progress(row.t / time.end)
         self.store.stepped(state)
-        if self.clock is not None:
-            self.clock(steps, state.t / time.end)
+        self.clock(steps, state.t / time.end)
+
+    def _row(self, state: State) -> None:
+        """Record a row, or take its output alone; the rest of it waits."""
+        if self.times is None:
+            self._recorded(state)
+        else:
+            self._values.append(self._output(self.system, state))
+            self._waiting.append(state)
 
     def _recorded(self, state: State) -> None:
         self.monitor.row(state)
@@ -263,14 +247,11 @@ class Simulation:
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
         log.warnings += [lost] if (lost := watched.farthest.warning()) else []
-        found = self._summary(status, history) | {
-            name: part.summary()
-            for name, part in (
-                ("stress", self.record.resultants),
-                ("stability", watched.stability),
-            )
-            if part is not None
-        }
+        found = self._summary(status, history)
+        if self.record.resultants is not None:
+            found["stress"] = self.record.resultants.summary()
+        if watched.stability is not None:
+            found["stability"] = watched.stability.summary()
         if failure is not None:
             found["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
         return self.record.result(found, history)
@@ -369,9 +350,9 @@ def run(
             done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
             if error.result is not None:
-                results.write(error.result, plots=False)
+                error.result.write_into(results)
             raise
-        problems = results.write(done, plots=False)
+        problems = done.write_into(results)
         if problems:
             raise problems[0]
         return done
@@ -418,10 +399,11 @@ def simulate(
             return done
         if scene.model.effects == "needed":
             raise InputError("model.effects", "needed", "needs accuracy, which says what is needed")
-        simulation = Simulation(scene, Problem.of(scene, terms=terms, outputs=outputs), store)
+        problem = Problem.of(scene, terms=terms, outputs=outputs)
+        simulation = Simulation(scene, problem, store, progress=progress or (lambda share: None))
         also, critical = hints_of_start(scene, simulation.problem), simulation.monitor.critical
         simulation.log.advice = advise(scene, hint, critical=critical, also=also)
-        result = simulation.run(progress)
+        result = simulation.run()
         if not scene.output.error:
             return result
         degree, log = simulation.system.V.element.basix_element.degree, simulation.log  # a default differs by cell

@@ -20,7 +20,6 @@ from rotfem.commands.processes import modal_summary
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.results.unbalance import UnbalanceResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.values import on_span
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -65,7 +64,7 @@ def unbalance(
         if not problem.unbalances:
             raise InputError("loads.unbalance", None, "give one, or a mass with an offset across the axis")
         for x, _ in probes:
-            if not on_span(x, shown.structure.length):
+            if not 0.0 <= x <= (shown.structure.length or 0.0):
                 raise SceneError("command line", "--probe", x, f"must be from 0 to {shown.structure.length:g} m")
         analysis = analysis_of(shown, problem, comm, False)
         response = UnbalanceResponse(analysis, problem.unbalances)

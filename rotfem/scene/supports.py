@@ -178,8 +178,6 @@ class SupportTable(SceneModel):
     frame: Literal["fixed", "rotating"] | None = None
 
     def _check(self) -> None:
-        if not any(np.any(matrices(c)) for c in (*self.springs, *self.dampers)):
-            raise problem("stiffness", None, "give stiffness, damping, or both; tilt_stiffness of turns")
         for i, under in enumerate(self.housing):
             if not np.any(matrices(under.stiffness)):
                 raise problem(f"housing.{i}.stiffness", None, "must be given: without it nothing holds the housing")

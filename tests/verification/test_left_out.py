@@ -182,7 +182,7 @@ KNOWN = {
         *("lag_stiffness", "lag_damping", "hinge_offset", "flap_stiffness", "flap_damping", "pitch_stiffness"),
         *("pitch_damping", "pitch", "driven", "free"),
     },
-    PointMass: {"x", "mass", "offset", "inertia"},
+    PointMass: {"x", "mass", "offset", "inertia", "polar_inertia", "transverse_inertia", "disk"},
     SupportTable: {"x", "stiffness", "damping", "tilt_stiffness", "tilt_damping", "housing", "frame"},
     PlateStructure: {
         *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),

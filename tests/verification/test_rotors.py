@@ -146,7 +146,7 @@ def test_jeffcott_rotor() -> None:
     """On rigid bearings the disk whirls at √(48 EI/(m L³)), both critical speeds: 5e-5, as stiff as they are."""
     diagram = rotfem.campbell(shaft_on_bearings(1e9), "0:150:6")
     expected = np.sqrt(48.0 * EI / 10.0)
-    assert {c.kind for c in diagram.critical_speeds[:2]} == {"backward", "forward"}
+    assert sorted(c.kind for c in diagram.critical_speeds[:2]) == ["backward", "forward"]
     np.testing.assert_allclose([c.speed for c in diagram.critical_speeds[:2]], expected, rtol=5e-5)
     whirl = np.array([row["frequency"] for row in diagram.rows if row["whirl"] != "standing"])
     np.testing.assert_allclose(whirl, expected, rtol=5e-5)
@@ -284,7 +284,6 @@ def test_bearings_and_a_shaft_that_both_differ_by_direction_are_refused() -> Non
         ({"motion": {"type": "constant", "speed": 5.0}}, "motion.axis"),
         ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
         ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
-        ({"supports": [{"x": 0.5}]}, "structure.supports.0.stiffness"),
         ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, -2.0]]}]}, "structure.supports.0.stiffness"),
         ({"precone": 0.1}, "structure.supports"),
         ({"root": {"driven": True, "lag_stiffness": 1.0}}, "structure.root.driven"),
