@@ -19,7 +19,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from rotfem import registry
-from rotfem.scene import beams, loads, motion, plates, section, settings, structure
+from rotfem.scene import beams, loads, motion, plates, section, settings, structure, supports
 from rotfem.scene.extensions import Extensions
 from rotfem.scene.scene import Scene
 from rotfem.scene.table import SceneModel
@@ -84,14 +84,32 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ),
     (
         "`[[structure.supports]]`",
-        structure.SupportTable,
+        supports.SupportTable,
         "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
         "root = { driven = true }\nsupports = [{ x = 0, stiffness = 1e6, damping = 200 }, { x = 10, stiffness = 1e6 }]",
     ),
     (
+        "Coefficients of supports as tables",
+        supports.OverSpeed,
+        "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
+        "supports = [{ x = 10, stiffness = { over_speed = [[0, 1e6], [100, 2e6, 3e6]] } }]",
+    ),
+    (
+        "`housing` of a support",
+        supports.Housing,
+        "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
+        "supports = [{ x = 10, stiffness = 1e6, housing = [{ mass = 20, stiffness = 5e6 }] }]",
+    ),
+    (
         "`[[structure.masses]]`",
-        beams.PointMass,
-        "toml spatial\n[[structure.masses]]\nx = 4.0\nmass = 2.0\noffset = [0, 0.1]\ninertia = 0.02",
+        beams.SpatialPointMass,
+        "toml spatial\n[[structure.masses]]\nx = 4.0\nmass = 2.0\noffset = [0, 0.1, 0]\ninertia = 0.02",
+    ),
+    (
+        "`disk` of a mass",
+        beams.DiskTable,
+        "toml spatial\n[[structure.masses]]\nx = 4.0\n"
+        "disk = { outer_diameter = '280 mm', width = '70 mm', rho = 7810 }",
     ),
     ("`[motion]`, of every type", motion.MotionTable, ""),
     ('`[motion]`, `type = "constant"`', motion.ConstantMotion, "toml\n[motion]\ntype = 'constant'\nspeed = '12.1 rpm'"),
@@ -141,6 +159,12 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
         "toml plate\n[loads.pressure]\nover_span = [[0, 100], [2, 0]]\nkind = 'follower'",
     ),
     ("`[[loads.at]]`", loads.PointLoad, "toml\n[[loads.at]]\nx = 4.0\nforce = [0, 20]"),
+    (
+        "`[[loads.unbalance]]`",
+        loads.UnbalanceTable,
+        "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n"
+        "[[loads.unbalance]]\nx = 4.0\nkg_m = 1e-3\nphase = '30 deg'",
+    ),
     (
         "`harmonic` of a load",
         loads.Harmonic,

@@ -224,8 +224,10 @@ class Scene(SceneModel):
         structure, motion, model = self.structure, self.motion, self.model
         if structure.is_planar:
             check_planar(motion, self.loads)
-        if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
-            raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
+        for i, support in enumerate(getattr(structure, "supports", ())):
+            if support.frame == "fixed" and any(motion.axis[1:]):
+                why = "is of a beam that spins about its own axis; those of others stand in the rotating frame"
+                raise problem(f"structure.supports.{i}.frame", "fixed", why)
         check_loads(structure, motion.is_free, self.loads, self.time is not None)
         check_mesh(structure, self.mesh)
         check_theory(structure, model)

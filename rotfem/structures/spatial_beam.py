@@ -324,9 +324,9 @@ class SpatialBeam(Beam):
 
     def supports(self, frame: Any) -> list[Support]:
         """Return the supports, across direction 1: of displacements and of turns, and what is under their housings."""
-        out, q = [], self.k.q
+        out, q, along = [], self.k.q, abs(self.problem.motion.axis[0]) == 1.0
         for i, support in enumerate(self.data.supports):
-            at, at_rest = self.points.measure((support.x,)), support.frame != "rotating"
+            at, at_rest = self.points.measure((support.x,)), along and support.frame != "rotating"
             places = [(q[1], q[2]), *(self._housing(j) for j in range(len(support.housing))), (0, 0)]
             springs = [(f"supports_{i}_", support, "")]
             springs += [(f"supports_{i}_housing_{j}_", under, "") for j, under in enumerate(support.housing)]

@@ -281,7 +281,7 @@ def test_bearings_and_a_shaft_that_both_differ_by_direction_are_refused() -> Non
 @pytest.mark.parametrize(
     ("change", "key"),
     [
-        ({"motion": {"type": "constant", "speed": 5.0}}, "motion.axis"),
+        ({"supports": [{"x": 0.5, "stiffness": 1.0, "frame": "fixed"}], "root": {}}, "structure.supports.0.frame"),
         ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
         ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
         ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, -2.0]]}]}, "structure.supports.0.stiffness"),
@@ -291,7 +291,9 @@ def test_bearings_and_a_shaft_that_both_differ_by_direction_are_refused() -> Non
 )
 def test_supports_that_cannot_be(change: dict[str, Any], key: str) -> None:
     tables = shaft_on_bearings(1.0)
-    tables = tables | change if "motion" in change else tables | {"structure": tables["structure"] | change}
+    tables = tables | {"structure": tables["structure"] | change}
+    if "frame" in str(change):
+        tables["motion"] = {"type": "constant", "speed": 5.0}
     with pytest.raises(rotfem.SceneError, match=key):
         rotfem.Scene.from_dict(tables)
 
@@ -556,3 +558,23 @@ def test_housings_in_series() -> None:
     history = rotfem.run(scene | {"time": {"end": 0.01, "step": 0.001}, "motion": {**scene["motion"], "speed": speed}})
     assert history.status == "done"
     assert not any("housing" in name for name in history.history)
+
+
+def test_a_strut_holds_the_tip_of_a_blade() -> None:
+    """A radial beam at rest, clamped and on a spring k at its tip: the equation of the cantilever with it, 1e-4."""
+    m, length, k = 2.0, 3.0, 500.0
+    section = {"EA": 1e9, "GA2": 1e9, "GA3": 1e9, "GJ": EI, "EI2": EI, "EI3": EI, "mass_per_length": m}
+    structure = {
+        "type": "spatial_beam",
+        "length": length,
+        "section": section,
+        "supports": [{"x": length, "stiffness": k}],
+    }
+    found = rotfem.modes({"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 2}})
+
+    def equation(b: float) -> float:
+        left = b**3 * (1.0 + np.cos(b) * np.cosh(b))
+        return left + k * length**3 / EI * (np.sin(b) * np.cosh(b) - np.cos(b) * np.sinh(b))
+
+    b = brentq(equation, 1.0, 3.9)
+    np.testing.assert_allclose(found.frequencies, (b / length) ** 2 * np.sqrt(EI / m), rtol=1e-4)
