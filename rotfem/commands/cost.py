@@ -1,6 +1,6 @@
 """`rotfem cost`: what accuracy costs in time, down the ladder of each theory and each time-stepping scheme.
 
-The reference is the last rung of the richest theory, known to the error of that (`rotfem.accuracy.refine.reduced`). A
+The reference is the last rung of the richest theory, known to the error of that (`rotfem.accuracy.ladder.reduced`). A
 row that is nearer to the reference than this has it as its error, and is no better than others of which the same is
 true.
 """
@@ -18,8 +18,7 @@ from mpi4py import MPI
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
-from rotfem.accuracy.ladder import ladder
-from rotfem.accuracy.refine import MOST_FAILURES, Clock, OverBudget, reduced
+from rotfem.accuracy.ladder import MOST_FAILURES, Clock, OverBudget, ladder, reduced
 from rotfem.accuracy.tuned import write_variant
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.answers import in_own_setting
@@ -264,12 +263,9 @@ class Study:
 
     def _refer(self, rungs: Iterator[Answer]) -> None:
         """Go down a ladder until its last rung, the reference, is known to a part of the accuracy."""
-        apart = math.inf
         for answer in rungs:
             if self.reference is not None:
-                before, apart = apart, distance(answer, self.reference).size
-                known = reduced(apart, before, RATIO)
-                self.known = math.inf if known is None else known
+                self.known = reduced(distance(answer, self.reference).size, self.known, RATIO)
             self.reference = answer
             if self.known <= AIM * self.accuracy:
                 return

@@ -19,8 +19,8 @@ from rotfem.scene.values import (
     Positive,
     WithParameters,
     check_increasing,
+    check_on_span,
     increasing,
-    on_span,
     parameters_of,
 )
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
@@ -211,9 +211,8 @@ def _counts_for(aspect: float) -> tuple[int, int]:
 
 def estimates_error(scheme: type) -> bool:
     """Return whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
-    base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
-    own: Any = scheme
-    return own.local_error is not base.local_error
+    owner = next(base for base in scheme.__mro__ if "local_error" in base.__dict__)
+    return "registry" not in owner.__dict__
 
 
 def usual(given: Mapping[str, Any]) -> str:
@@ -411,6 +410,5 @@ class OutputTable(SceneModel):
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)
             raise problem("output.stations", shown, f"are places along a beam; a {kind} has none")
-        outside = [x for x in self.positions(length) if not on_span(x, length)]
-        if outside:
-            raise problem("output.stations", outside[0], f"must be from 0 to the length {length:g} m")
+        for x in self.positions(length):
+            check_on_span("output.stations", x, length)
