@@ -34,6 +34,7 @@ from rotfem.commands.first_state import first_state
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
@@ -420,7 +421,7 @@ class Output:
     size: float = 0.0
 
 
-def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
     """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
     if system.linear:
         return compute()
@@ -526,7 +527,7 @@ def groups(of: Explanation) -> dict[str, float]:
     return out
 
 
-def _frequencies_at_rest(system: Any, count: int) -> Array:
+def _frequencies_at_rest(system: System, count: int) -> Array:
     """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
     system.set_time(0.0, system.motion.at_speed(0.0))
     system.set_state(system.zeros())
@@ -536,7 +537,7 @@ def _frequencies_at_rest(system: Any, count: int) -> Array:
         return np.empty(0)
 
 
-def _added_mass(system: Any, effect: str) -> float:
+def _added_mass(system: System, effect: str) -> float:
     """Return the masses that an effect brings, as a share of the mass of the structure without them."""
     switch, bodies = system.structure.constant(1.0), system.structure.bodies((effect,))
     parts = [(switch if b.effect == effect else 1.0) * b.density * b.measure for b in bodies if b.is_position]
