@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 
-def check_finite(value: Any, where: str = "result", infinite: bool = False) -> None:
-    """See that all numbers in nested tables and arrays are finite, or, if they may be infinite, numbers."""
+def check_finite(value: Any, where: str = "result") -> None:
+    """See that all numbers in nested tables and arrays are finite."""
     if isinstance(value, Mapping):
         for key, entry in value.items():
-            check_finite(entry, f"{where}.{key}", infinite)
+            check_finite(entry, f"{where}.{key}")
     elif isinstance(value, list | tuple):
         for i, entry in enumerate(value):
-            check_finite(entry, f"{where}[{i}]", infinite)
+            check_finite(entry, f"{where}[{i}]")
     elif isinstance(value, np.ndarray | float | complex):
-        assert not np.any(np.isnan(value)), f"{where} is no number"
-        assert infinite or np.all(np.isfinite(value)), f"{where} is not finite"
+        assert np.all(np.isfinite(value)), f"{where} is not finite"

@@ -13,19 +13,20 @@ import numpy as np
 
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.schemes import Array, State
+from rotfem.equations.system import System
 from rotfem.scene import Scene
 
 #: An output of a state of a system.
 Output = Callable[[Any, State], Array]
 
 
-def tip(system: Any, state: State) -> Array:
+def tip(system: System, state: State) -> Array:
     """Return the displacement of the tip in the frame that turns with the hub, and its rotation times a radius, m."""
     system.count_rotations_from(state.reference)
     return np.asarray(system.tip(state.q, state.t) * system.structure.lever)
 
 
-def root_moment(system: Any, state: State) -> Array:
+def root_moment(system: System, state: State) -> Array:
     """Return the moment of the hub on the structure at its root, N·m."""
     system.count_rotations_from(state.reference)
     system.set_time(state.t)
@@ -49,7 +50,7 @@ def of_columns(name: str, history: Mapping[str, Array], structure: Any) -> Array
     return np.column_stack([x for column, x in history.items() if column.startswith("root_m")])
 
 
-def lines(system: Any) -> list[Array]:
+def lines(system: System) -> list[Array]:
     """Return the coordinates (m) of all vertices of a mesh along each axis, each once and in order."""
     mesh, out = system.structure.mesh, list[Array]()
     for axis in range(mesh.topology.dim):

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.numerics.projection import sparse_part
 
@@ -50,7 +51,7 @@ class FixedFrame:
         system: compiled equations of the shaft in the rotating frame.
     """
 
-    def __init__(self, system: Any):
+    def __init__(self, system: System):
         self.V, self.supports = system.V, system.model.problem.structure.supports
         names, axis = list(system.structure.unknowns), np.asarray(system.motion.axis, dtype=float)
         if system.hub is not None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import basix.ufl
 import numpy as np
@@ -25,6 +25,8 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
@@ -43,7 +45,7 @@ class Resultants:
         system: equations of motion of the structure, hub held, not moving.
     """
 
-    def __init__(self, system: Any):
+    def __init__(self, system: System):
         self.system, self.model, self.V = system, system.model, system.V
         m = self.model.mechanics
         stiff = [s for s in m.strains if s.name in system.structure.stiff]
@@ -110,7 +112,7 @@ class Resultants:
             fem_petsc.assemble_matrix(rest, self._rest, system.bcs, 0.0)
             rest.assemble()
         if system.linear:
-            system.add_other_stiffness(rest)
+            cast(AffineSystem, system).add_other_stiffness(rest)
         set_diagonal(system.clamped, rest, 1.0)
         free = M.createVecRight()
         free.array[:] = 1.0
@@ -128,7 +130,8 @@ class Resultants:
         K, factors = (_bordered(corner, rows, blocks) for corner in (rest, _empty(M)))
         pencil = Pencil(_bordered(M, apart, zero), _bordered(C, apart, zero), K)
         scale(pencil, rest, factors, unit)
-        has_stress = system.has_prestress if system.linear else bool(np.any(self._state.x.array))
+        stressed = bool(np.any(self._state.x.array))
+        has_stress = cast(AffineSystem, system).has_prestress if system.linear else stressed
         if self._stressed is None or not system.comm.allreduce(has_stress, op=MPI.LOR):
             return pencil, None
         stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
@@ -163,7 +166,7 @@ class KeptDigits:
         used: whether it has kept more digits of some pairs.
     """
 
-    def __init__(self, system: Any):
+    def __init__(self, system: System):
         self.system, self.used = system, False
 
     @cached_property

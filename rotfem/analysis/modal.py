@@ -28,6 +28,7 @@ from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotro
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import massed
+from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
@@ -183,11 +184,11 @@ class ModalAnalysis:
         about: str = "steady",
         newton: Newton | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
-        system: Any = None,
+        system: System | None = None,
     ):
         started = perf_counter()
         self.problem, self.about, self.comm = problem.replace(frame="rotating"), about, comm
-        self.system: Any = compile_system(self.problem, comm, moving=False) if system is None else system
+        self.system = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None

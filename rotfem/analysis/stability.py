@@ -16,7 +16,7 @@ section 7.1). Where follower forces make K unsymmetric, there is no such count, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,9 @@ from slepc4py import SLEPc
 
 from rotfem.analysis.equilibrium import LoadFactors, balance
 from rotfem.analysis.modal import GROWTH
+from rotfem.equations.affine import AffineSystem
 from rotfem.equations.compiled import with_all_unknowns
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
@@ -104,7 +106,7 @@ class Stability:
         return out | ({"held_by_gyroscopic_forces": True} if self.held_by_spin else {})
 
 
-def stability_of(system: Any, q: Array, speed: float) -> Stability:
+def stability_of(system: System, q: Array, speed: float) -> Stability:
     """Return the stability of an equilibrium q (local dof array) at constant speed (rad/s), hub held or free.
 
     The state and the speed are left in the system's functions.
@@ -203,7 +205,7 @@ def act_at_start(problem: Problem) -> bool:
     return motion.speed(0.0) != 0.0 or any(force.any() for force in forces)
 
 
-def constant_stability(system: Any, newton: Newton) -> Stability | None:
+def constant_stability(system: System, newton: Newton) -> Stability | None:
     """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
 
     A symmetric structure under symmetric loads never leaves an unstable equilibrium by itself: its history looks calm.
@@ -226,7 +228,7 @@ def constant_stability(system: Any, newton: Newton) -> Stability | None:
 SOON = 20
 
 
-def critical_speed(system: Any) -> float | None:
+def critical_speed(system: System) -> float | None:
     """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
 
     Of a nonlinear theory there is none: its stiffness is that of each equilibrium. One beyond a thousand
@@ -236,7 +238,7 @@ def critical_speed(system: Any) -> float | None:
     """
     if not system.linear:
         return None
-    K_1, K_2 = system.stiffness_pieces()
+    K_1, K_2 = cast(AffineSystem, system).stiffness_pieces()
     if K_2.norm() == 0.0:
         return None
     d = unknown_scale(K_2, K_1, 1.0)

@@ -35,6 +35,16 @@ def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
         raise InputError("accuracy_of", scene.accuracy_of, reason)
 
 
+def in_own_setting(scene: Scene) -> Scene:
+    """Return a scene without its accuracy, with all effects where that would choose them."""
+    changes: dict[str, Any] = dict.fromkeys(("accuracy", "accuracy_of", "accuracy_budget"))
+    if scene.time is not None:  # an accuracy may have given its steps
+        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
+    if scene.model.effects == "needed":
+        changes["model.effects"] = "auto"
+    return scene.replace(changes)
+
+
 def clock_of(scene: Scene, comm: MPI.Comm, announce: Hint | None = None) -> Clock:
     """Return the clock of a scene's answers; rank 0 decides for all."""
     return Clock(scene.accuracy_budget, lambda x: float(comm.bcast(x)), announce)

@@ -16,6 +16,7 @@ from rotfem.accuracy.answer import Answers
 from rotfem.accuracy.cost import ERRORS, CostResult, Study, recommendations
 from rotfem.accuracy.refine import Clock
 from rotfem.analysis.equilibrium import check_steady
+from rotfem.commands.answers import in_own_setting
 from rotfem.commands.interrupts import together
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem, motion_of
@@ -65,7 +66,7 @@ def cost(
         ComputationError: not one setting could be computed.
         Stopped: it was interrupted; its attribute `result` holds what was measured.
     """
-    scene = without_accuracy(as_scene(scene))
+    scene = in_own_setting(as_scene(scene))
     output = checked(scene, accuracy, output)
     seconds = (120.0 if quick else 1200.0) if budget is None else seconds_of(budget, scene.file)
     names = chosen(scene, "theories", theories, [t.name for t in theories_of(scene, quick)])
@@ -151,16 +152,6 @@ def eigenvalues(variant: Scene, output: str, comm: MPI.Comm) -> Eigenvalues:
 
 
 # --- what is tried ----------------------------------------------------------------------------------------------------
-
-
-def without_accuracy(scene: Scene) -> Scene:
-    """Return a scene in its own setting."""
-    changes: dict[str, Any] = dict.fromkeys(("accuracy", "accuracy_of", "accuracy_budget"))
-    if scene.time is not None:  # an accuracy may have given its steps
-        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
-    if scene.model.effects == "needed":
-        changes["model.effects"] = "auto"
-    return scene.replace(changes)
 
 
 def checked(scene: Scene, accuracy: float, output: str | None) -> str:

@@ -1,9 +1,15 @@
-"""`rotfem explain`: which effects and which theory a scene calls for, and what each of them changes."""
+"""`rotfem explain`: which effects and which theory a scene calls for, and what each of them changes.
+
+The change of an output is the distance of two answers in one setting: with and without an effect, or in another theory.
+The setting is the first one, from half the cells and a loose tolerance on, whose own answer is near to that of the next
+finer one. Steps are then of equal length, as many as the adaptive ones of the own model, so that errors by steps cancel
+in the difference.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
@@ -13,20 +19,9 @@ import numpy.typing as npt
 from dolfinx import fem
 from mpi4py import MPI
 
-from rotfem.accuracy.answer import Answers, Setting, distance
-from rotfem.accuracy.explain import (
-    HISTORY,
-    MODES,
-    RESOLVED,
-    STEADY,
-    Change,
-    Compared,
-    Needed,
-    compared,
-    fails,
-    needed,
-)
-from rotfem.accuracy.explain import explain as explain_change
+from rotfem.accuracy.answer import Answer, Answers, Setting, distance
+from rotfem.accuracy.errors import ASYMPTOTIC, finer, on_other_meshes
+from rotfem.accuracy.ladder import TOLERANCES
 from rotfem.accuracy.outputs import tip
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
@@ -34,10 +29,12 @@ from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import State
 from rotfem.commands.advice import frozen_inputs
+from rotfem.commands.answers import in_own_setting
 from rotfem.commands.first_state import first_state
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
@@ -52,12 +49,28 @@ from rotfem.scene import Scene, as_scene
 Array = npt.NDArray[Any]
 T = TypeVar("T")
 
+#: Names of the outputs that models are compared by.
+HISTORY, STEADY, MODES = "history", "steady", "modes"
+
+#: Factor by which a computed change may be wrong; relative changes from which one is noticeable, and large. They define
+#: the words of a verdict.
+SAFETY, NOTICEABLE, LARGE = 3.0, 1e-2, 1e-1
+
+#: Smallest change that is resolved: Newton's increments, and round-off of eigenvalues.
+RESOLVED = 1e-8
+
+#: Relative error of an answer above which changes are unknown: that of a sine delayed by a twelfth of its period.
+FAR = 0.5
+
+#: Distance of two settings that are near, of a history and of what has no steps; settings of a history that are tried.
+NEAR, MOST = {True: ASYMPTOTIC / SAFETY, False: NOTICEABLE}, 5
+
+#: Accuracy that the model is for if a scene names none, and the part of it that all that is left out may change.
+ACCURACY, SHARE = 1e-2, 0.25
+
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
-
-#: Accuracy that the model is for if a scene names none: what is negligible is so for it.
-ACCURACY = 1e-2
 
 
 def explain(
@@ -89,32 +102,94 @@ def explain(
 
 def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:
     """Return the effects of a history or steady state that its accuracy calls for; all where nothing is known."""
-    assert scene.accuracy is not None
-    of = Explanation(scene, terms, comm, modes=False)
-    of.compute(lambda share: None, ("effect",))
-    return of.needed(scene.accuracy, theory=False)
+    of = Explanation(scene, terms, comm, whole=False)
+    of.compute(lambda share: None)
+    return of.needed()
 
 
 @dataclass
-class Outcome:
-    """An output of one model.
+class Change:
+    """A change of the answer by an effect or a theory.
 
     Attributes:
-        output: of it.
-        steps: that were taken; 0 of what has none.
-        size: largest displacement over the length, or rotation in rad.
-        stable, round_off: not asked for.
+        kind: "effect" or "theory".
+        name: of the effect, or of the other theory.
+        included: whether the own model has it.
+        estimate: output ↦ relative change; infinite where the other model fails, None where it is unknown.
+        notes: output ↦ why a model fails.
+        refused: why the scene cannot have it; "" if it can.
+        truth: output ↦ relative change in the scene's own setting, where that was asked for.
     """
 
-    output: Any
-    steps: int = 0
-    size: float = 0.0
-    stable: bool | None = None
-    round_off: float | None = None
+    kind: str
+    name: str
+    included: bool
+    estimate: dict[str, float | None] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    refused: str = ""
+    truth: dict[str, float] = field(default_factory=dict)
 
-    def result(self) -> Any:
-        """Return the output, which is all there is."""
-        return self.output
+    def of(self, own: Setting) -> Setting:
+        """Return a setting of the own model with this change."""
+        if self.kind == "theory":
+            return replace(own, theory=self.name)
+        return replace(own, effects=tuple(sorted(set(own.effects or ()) ^ {self.name})))
+
+    @property
+    def worst(self) -> float:
+        """Largest known estimate over the outputs."""
+        return max((x for x in self.estimate.values() if x is not None), default=0.0)
+
+    @property
+    def verdict(self) -> str:
+        """Word for it: "negligible" (SAFETY times it is below 1 %), "noticeable", "large" or "unknown"."""
+        if self.refused:
+            return "not available"
+        if self.worst >= LARGE:
+            return "large"
+        if None in self.estimate.values():
+            return "unknown"
+        return "negligible" if SAFETY * self.worst < NOTICEABLE else "noticeable"
+
+    def why(self, own: Theory) -> str:
+        """Return in a few words why it is in a model or not, and whether it has to be."""
+        if self.refused:
+            return self.refused
+        failed = "".join(f"; {name}: {text}" for name, text in self.notes.items())
+        if self.verdict == "unknown":
+            return "these steps do not show it" + failed
+        poorer = self.kind == "theory" and Theory.registry[self.name].rank < own.rank
+        follows = (ENOUGH if poorer else NEEDED)[self.verdict].format(self.worst) + failed
+        if self.kind == "theory":
+            return follows
+        reason = Effect.registry[self.name].reasons[0]
+        return f"{reason}{'' if self.included else ', but it is not in model.effects'}; {follows}"
+
+    def row(self, own: Theory) -> dict[str, Any]:
+        """Return it as a dictionary for JSON."""
+        row = asdict(self) | {"worst": self.worst, "verdict": self.verdict, "why": self.why(own)}
+        return {name: row[name] for name in row if name != "refused" and (row[name] or name in ("included", "worst"))}
+
+
+@dataclass(frozen=True)
+class Needed:
+    """The poorest model whose answer is within a part of an accuracy of the own one.
+
+    Attributes:
+        accuracy: relative.
+        theory: name.
+        effects: those that it has.
+        dropped: names of effects that it has not.
+        change: of the answer by all that is dropped together, and by the theory, relative.
+        seconds: CPU times of a history with this model and with the own one in the setting of the comparison, s.
+    """
+
+    accuracy: float
+    theory: str
+    effects: tuple[str, ...]
+    dropped: tuple[str, ...] = ()
+    change: float = 0.0
+    seconds: tuple[float, float] | None = None
 
 
 class Explanation:
@@ -124,139 +199,143 @@ class Explanation:
         scene: validated.
         terms: of a script, by name.
         comm: MPI communicator.
-        modes: whether modes are among the outputs.
+        whole: whether modes are among the outputs, and theories among the changes.
 
     Attributes:
-        effects: all with data; `own` is the setting of the scene, with those of its model.
+        problem: of the own model; `system` is that on the scene's mesh, effects switched by constants.
+        own: setting of the scene, with the effects of its model.
         absent: output ↦ why there is none; `answers` are those of the others.
-        system: of the own model on the scene's mesh, effects switched by constants.
         speed: of the modes, rad/s.
         failed: output ↦ why the own model has none.
-        pairs: output ↦ the own model in the settings of the comparison.
+        whole: output ↦ answer of the own model in the setting of the comparison, and its relative error.
         changes: every effect there are data for, then every other theory.
     """
 
-    def __init__(self, scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm, modes: bool = True):
+    def __init__(self, scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm, whole: bool = True):
         self.given, self.terms, self.comm = scene, terms, comm
-        changes: dict[str, Any] = {
-            **dict.fromkeys(("accuracy", "accuracy_of", "accuracy_budget")),
-            "output.error": False,
-        }
-        if scene.time is not None:  # an accuracy may have given its steps
-            changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
-        if scene.model.effects == "needed":
-            changes["model.effects"] = "auto"
-        self.scene = scene = scene.replace({**changes, "model.frame": "rotating"})
+        self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": "rotating"})
         self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
-        self.inner, whole = communicator(problem, comm), problem.replace(effects=None)
-        self.effects, kind = whole.effective_effects(), problem.structure.type
-        self.own = replace(Setting.of(scene), effects=problem.effective_effects())
+        self.inner, self.effects = communicator(problem, comm), problem.replace(effects=None).effective_effects()
         self._systems: dict[tuple[str, str], Any] = {}
         self.system = self._switched(problem)
-        self.own = replace(self.own, degree=self.system.V.element.basix_element.degree)  # a default differs by cell
-        self.speed = self._reached()
-        self.absent = self._absent()
-        compute = {HISTORY: self._history, STEADY: self._steady, MODES: self._modes}
+        degree = self.system.V.element.basix_element.degree  # a default differs by cell
+        self.own = replace(Setting.of(scene), degree=degree, effects=problem.effective_effects())
+        self.turning, self.absent = self._turning(), self._absent()
+        self.speed = problem.motion.final_speed(0.0 if scene.time is None else scene.time.end)
+        if problem.motion.hub is not None and scene.time is not None:
+            self.speed = max(self.turning[0], key=abs)
+        compute: dict[str, Any] = {HISTORY: self._history, STEADY: self._steady, MODES: self._modes}
         self.answers = {
-            name: Answers(scene, lambda variant, times, of=of: of(variant), moving=name == HISTORY)  # type: ignore[misc]
+            name: Answers(scene, of, moving=name == HISTORY)
             for name, of in compute.items()
-            if name not in self.absent and (modes or name != MODES)
+            if name not in self.absent and (whole or name != MODES)
         }
-        self.failed, self.pairs = dict[str, str](), dict[str, Compared]()
+        self.failed, self.whole = dict[str, str](), dict[str, tuple[Answer, float]]()
         self.changes = [Change("effect", name, name in (self.own.effects or ())) for name in self.effects]
-        others = [theory for theory in theories() if theory.holds_for(kind) and theory is not problem.theory]
-        self.changes += [Change("theory", theory.name, False) for theory in others]
+        if whole:
+            there = [t for t in theories() if t.holds_for(problem.structure.type) and t is not problem.theory]
+            self.changes += [Change("theory", theory.name, False) for theory in there]
 
     def _absent(self) -> dict[str, str]:
         """Return output ↦ why there is none of it."""
-        out = {STEADY: "the scene asks for a history"}
-        if self.scene.time is None:
-            out = {HISTORY: "the scene has no [time]"}
-            try:
-                self.scene.check_run()
-                check_steady(self.problem.replace(effects=None))
-            except InputError as error:
-                out[STEADY] = str(error)
+        if self.scene.time is not None:
+            return {STEADY: "the scene asks for a history"}
+        out = {HISTORY: "the scene has no [time]"}
+        try:
+            self.scene.check_run()
+            check_steady(self.problem.replace(effects=None))
+        except InputError as error:
+            out[STEADY] = str(error)
         return out
 
-    def _reached(self) -> float:
-        """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
-        motion, time = self.problem.motion, self.scene.time
-        if motion.hub is None or time is None:
-            return motion.final_speed(0.0 if time is None else time.end)
-        times = np.unique([*np.linspace(0.0, time.end, 2001), *motion.hub.torque.knots])
+    def _turning(self) -> tuple[Array, Array]:
+        """Return Ω and dΩ/dt at some times of the motion; of a free hub those of the rigid structure."""
+        motion, end = self.problem.motion, 0.0 if self.scene.time is None else self.scene.time.end
+        times = np.linspace(0.0, max(end, motion.settled), 401)
+        if motion.hub is None:
+            return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
+        times = np.unique([*times, *motion.hub.torque.knots])
         speeds = motion.hub.rigid_speeds(times, self.system.row.rest_inertia())
-        return float(speeds[np.argmax(np.abs(speeds))])
+        return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
 
     # --- the outputs of a model -------------------------------------------------------------------------------------
 
-    def _switched(self, problem: Any) -> Any:
+    def _switched(self, problem: Problem) -> Any:
         """Return the system of a problem; those of one theory and mesh are one, with effects switched by constants."""
         whole = problem.replace(effects=None)
         key = problem.theory.name, repr(problem.mesh)
         if key not in self._systems:
-            system = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
+            system = self._systems[key] = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
             if system.linear:
                 system.check_terms()
-            self._systems[key] = system
         self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
         return self._systems[key]
 
-    def _of(self, variant: Scene) -> tuple[Any, Any]:
+    def _of(self, variant: Scene) -> tuple[Problem, Any, Newton]:
         problem = Problem.of(variant, terms=self.terms).replace(outputs={})
-        return problem, self._switched(problem)
+        return problem, self._switched(problem), Newton.of(variant.solver)
 
-    def _history(self, variant: Scene) -> Outcome:
-        problem, system = self._of(variant)
-        return marched(variant, problem, system)
+    def _history(self, variant: Scene, times: Array | None) -> Output:
+        """Return the tip at all steps, and the largest displacement over the length, or rotation in rad."""
+        (problem, system, newton), time = self._of(variant), variant.time
+        assert time is not None
+        start = with_plain_tangents(system, lambda: first_state(variant, problem, system, judged=False))
+        t, tips, largest = list[float](), list[Array](), 0.0
+        for state in March(system, scheme_of(time), Steps.of(time), newton, start.q, start.v):
+            size = float(system.size(state.q))
+            largest = max(largest, size)
+            t.append(state.t)
+            tips.append(tip(system, state))
+            if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
+                raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+        return Output(Series(np.array(t), np.array(tips)), len(t) - 1, largest)
 
-    def _steady(self, variant: Scene) -> Outcome:
-        problem, system = self._of(variant)
-        speed, newton = problem.motion.speed(0.0), Newton.of(variant.solver)
-        q = with_plain_tangents(system, lambda: steady_state(system, speed, newton))
+    def _steady(self, variant: Scene, times: Array | None) -> Output:
+        problem, system, newton = self._of(variant)
+        q = with_plain_tangents(system, lambda: steady_state(system, problem.motion.speed(0.0), newton))
         values = tip(system, State.at_rest(system, *system.start(q)))
-        return Outcome(Series(np.zeros(1), values[None, :]), size=float(system.size(q)))
+        return Output(Series(np.zeros(1), values[None, :]), 0, float(system.size(q)))
 
-    def _modes(self, variant: Scene) -> Outcome:
-        """Compute the eigenvalues by size, without a rigid body, of an overdamped mode the slow one."""
-        _, system = self._of(variant)
-        count, newton = variant.modes.count, Newton.of(variant.solver)
+    def _modes(self, variant: Scene, times: Array | None) -> Output:
+        """Return the eigenvalues by size, without a rigid body, of an overdamped mode the slow one."""
+        (_, system, newton), count = self._of(variant), variant.modes.count
         analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
         spinning = with_plain_tangents(system, lambda: analysis.at(self.speed, count))
         names = analysis.described(spinning).names[: count - int(spinning.rigid)]
         lasting = [name.rest != "fast" for name in names]
-        return Outcome(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
+        return Output(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
 
     # --- what is made of them ---------------------------------------------------------------------------------------
 
-    def compute(self, progress: Progress, kinds: tuple[str, ...] = ("effect", "theory")) -> None:
-        """Compute the changes of some kinds."""
-        changes = [change for change in self.changes if change.kind in kinds]
-        for i, (output, answers) in enumerate(self.answers.items()):
-            own = self.own if output == HISTORY else replace(self.own, scheme=None, tolerance=None, step=None)
-            try:
-                pair = self.pairs[output] = compared(answers, replace(own, max_step=None))
-            except ComputationError as error:
-                self.failed[output] = error.what
-                fails(changes, output, error.what)
-                continue
-            for j, change in enumerate(changes):
-                if not change.refused:
-                    explain_change(change, output, answers, pair)
-                progress((i + (j + 1) / len(changes)) / len(self.answers))
+    def _setting(self, output: str) -> Setting:
+        still = {} if output == HISTORY else dict.fromkeys(("scheme", "tolerance", "step", "max_step"))
+        return replace(self.own, **still)  # type: ignore[arg-type]
 
-    def needed(self, accuracy: float, theory: bool = True) -> Needed:
-        """Return the model that an accuracy calls for; the own one where an output of it cannot be computed."""
-        effects = self.own.effects or ()
-        if self.failed or not self.pairs:
-            return Needed(self.own.theory, effects)
-        return needed(self.changes, self.own, accuracy, self.answers, self.pairs, theory)
+    def compute(self, progress: Progress) -> None:
+        """Compute all changes."""
+        for i, (output, answers) in enumerate(self.answers.items()):
+            try:
+                own, error = self.whole[output] = compared(answers, self._setting(output))
+            except ComputationError as failure:
+                self.failed[output] = failure.what
+            for j, change in enumerate(self.changes):
+                if output in self.failed:
+                    change.estimate[output], change.notes[output] = np.inf, self.failed[output]
+                    continue
+                try:
+                    size = distance(own, answers(change.of(own.setting))).size
+                    change.estimate[output] = None if error > FAR else size
+                except ComputationError as failure:
+                    change.estimate[output], change.notes[output] = np.inf, failure.what
+                except InputError as failure:
+                    change.refused, change.estimate[output] = failure.allowed, None
+                progress((i + (j + 1) / len(self.changes)) / len(self.answers))
 
     def check(self, progress: Progress) -> None:
         """Compute every change in the scene's own setting, too."""
         there = [change for change in self.changes if not change.refused]
         for output, answers in self.answers.items():
-            own = self.own if output == HISTORY else replace(self.own, scheme=None, tolerance=None, step=None)
+            own = self._setting(output)
             for i, change in enumerate(there, start=1):
                 try:
                     change.truth[output] = distance(answers(own), answers(change.of(own))).size
@@ -264,18 +343,56 @@ class Explanation:
                     change.truth[output] = np.inf
                 progress(i / len(there))
 
+    def needed(self) -> Needed:
+        """Return the model that the accuracy calls for; the own one where an output of it cannot be computed.
+
+        Effects go from the smallest one on, and the poorest theory is taken, while each change is within SHARE of the
+        accuracy. Then all is left out together. While that changes an output by more, the largest of it is put back.
+        """
+        accuracy = self.given.accuracy or ACCURACY
+        own = Needed(accuracy, self.own.theory, self.own.effects or ())
+        if self.failed:
+            return own
+        rank = {theory.name: theory.rank for theory in theories()}
+        small = [c for c in self.changes if c.worst <= SHARE * accuracy and c.verdict in NEEDED]
+        out = sorted((c for c in small if c.kind == "effect" and c.included), key=lambda c: c.worst)
+        poorer = [c for c in small if c.kind == "theory" and rank[c.name] < rank[own.theory]]
+        out += sorted(poorer, key=lambda c: rank[c.name])[:1]
+        while out:
+            dropped = tuple(c.name for c in out if c.kind == "effect")
+            effects = tuple(name for name in own.effects if name not in dropped)
+            theory = out[-1].name if out[-1].kind == "theory" else own.theory
+            change, seconds = 0.0, None
+            for output, (whole, _) in self.whole.items():
+                try:
+                    less = self.answers[output](replace(whole.setting, theory=theory, effects=effects))
+                    change = max(change, distance(whole, less).size)
+                except (ComputationError, InputError):
+                    change = np.inf
+                    break
+                if output == HISTORY:  # others are too short
+                    seconds = less.seconds, whole.seconds
+            if change <= SHARE * accuracy:
+                return Needed(accuracy, theory, effects, dropped, change, seconds)
+            out.remove(max(out, key=lambda c: c.worst))
+        return own
+
     def result(self, check: bool, progress: Progress) -> ExplainResult:
-        """Return the result of a verb."""
-        started, accuracy = perf_counter(), self.given.accuracy or ACCURACY
+        """Return the result of the verb."""
+        started = perf_counter()
         self.compute(progress)
-        model = self.needed(accuracy)
+        model = self.needed()
         spent = {"estimate": perf_counter() - started, "check": 0.0}
         if check:
             self.check(progress)
             spent["check"] = perf_counter() - started - spent["estimate"]
-        self._switched(self.problem)
         numbers, theory = groups(self), self.problem.theory
-        rows = [{**change.row(), "why": why(change, theory)} for change in self.changes]
+        warnings = [f"{output} of {theory.name} cannot be computed: {what}" for output, what in self.failed.items()]
+        if MODES in self.answers:
+            warnings += [f"modes: {line}" for line in frozen_inputs(self.problem)]
+        if self.given.model.frame == "inertial":
+            warnings.append("estimates are of the rotating frame, where the same physics is a sum of effects")
+        rows = [change.row(theory) for change in self.changes]
         found: dict[str, Any] = {
             **summary("explain", self.given, self.comm, self.inner),
             "theory": theory.name,
@@ -287,31 +404,24 @@ class Explanation:
             "absent_outputs": self.absent,
             "absent_effects": {e.name: e.reasons[1] for e in Effect.registry if e.name not in self.effects},
             "rows": rows,
-            "needed": {
-                "accuracy": accuracy,
-                "theory": model.theory,
-                "effects": list(model.effects),
-                "dropped": list(model.dropped),
-                "change": model.change,
-                "seconds": model.seconds,
-            },
+            "needed": {key: list(x) if isinstance(x, tuple) else x for key, x in asdict(model).items()},
             "speeds": [self.speed],
-            "warnings": self._doubts(),
+            "warnings": warnings,
             "timings": {**spent, "total": sum(spent.values())},
         }
         return ExplainResult(found, rows)
 
-    def _doubts(self) -> list[str]:
-        """Return warnings about what the estimates are of."""
-        out = [f"{name} of {self.problem.theory.name} cannot be computed: {what}" for name, what in self.failed.items()]
-        if MODES in self.answers:
-            out += [f"modes: {line}" for line in frozen_inputs(self.problem)]
-        if self.given.model.frame == "inertial":
-            out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
-        return out
+
+@dataclass(frozen=True)
+class Output:
+    """An outcome that is an output and no more, with the largest displacement over the length, or rotation in rad."""
+
+    output: Any
+    steps: int = 0
+    size: float = 0.0
 
 
-def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
+def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
     """Return what a computation gives with the plain tangent or, if it fails, the one that takes longer to compile."""
     if system.linear:
         return compute()
@@ -325,36 +435,51 @@ def with_plain_tangents(system: Any, compute: Callable[[], T]) -> T:
         system.plain = True
 
 
-def marched(scene: Scene, problem: Any, system: Any) -> Outcome:
-    """Return the tip over time of a system, at all steps."""
-    time = scene.time
-    assert time is not None
-    start = with_plain_tangents(system, lambda: first_state(scene, problem, system, judged=False))
-    times, tips, largest = list[float](), list[Array](), 0.0
-    for state in March(system, scheme_of(time), Steps.of(time), Newton.of(scene.solver), start.q, start.v):
-        size = float(system.size(state.q))
-        largest = max(largest, size)
-        times.append(state.t)
-        tips.append(tip(system, state))
-        if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
-            raise ComputationError(f"it diverges at t = {state.t:.4g} s")
-    return Outcome(Series(np.array(times), np.array(tips)), len(times) - 1, largest)
+# --- the settings of a comparison -------------------------------------------------------------------------------------
 
 
-def why(change: Change, own: Theory) -> str:
-    """Return in a few words why an effect or theory is in a model or not, and whether it has to be."""
-    if change.refused:
-        return change.refused
-    failed = "".join(f"; {name}: {text}" for name, text in change.notes.items())
-    if change.verdict == "unknown":
-        return "these steps do not show it" + failed
-    if change.kind == "effect":
-        reason = Effect.registry[change.name].reasons[0]
-        if not change.included:
-            reason += ", but it is not in model.effects"
-        return f"{reason}; {NEEDED[change.verdict].format(change.worst)}{failed}"
-    poorer = Theory.registry[change.name].rank < own.rank
-    return (ENOUGH if poorer else NEEDED)[change.verdict].format(change.worst) + failed
+def settings(own: Setting) -> Iterator[Setting]:
+    """Yield settings from the coarsest on: half the cells, the scene's own, twice them where nothing moves."""
+    coarse = on_other_meshes(own)[0]
+    first = own if coarse.factor < 1.0 else coarse.setting
+    if not own.moving:
+        yield from dict.fromkeys((first, own, finer(own)))
+        return
+    for mesh, tolerance in zip((first, *[own] * MOST), TOLERANCES[:MOST], strict=False):
+        yield replace(mesh, scheme="esdirk4", tolerance=tolerance, step=None, max_step=None)
+
+
+def compared(answers: Answers, own: Setting) -> tuple[Answer, float]:
+    """Return the own model in the first setting whose answer is near that of the next one, and its relative error.
+
+    Args:
+        answers: of the scene.
+        own: the setting that it says.
+
+    Raises:
+        ComputationError: the own model has no answer.
+        InputError: likewise.
+    """
+    found: list[Answer] = []
+    failure: ComputationError | InputError = ComputationError("no setting has an answer")
+    for setting in settings(own):
+        try:
+            found.append(answers(setting))
+        except (ComputationError, InputError) as error:  # elements of a lower degree lock, long steps may fail
+            failure = error
+            continue
+        if len(found) > 1 and distance(*found[:-3:-1]).size <= NEAR[own.moving]:
+            break
+    if len(found) < 2:
+        raise failure
+    *_, coarse, fine = found
+    apart = distance(fine, coarse).size
+    answer, time = coarse if apart <= NEAR[own.moving] else fine, answers.scene.time
+    if own.moving and time is not None:
+        step = time.end / max(answer.outcome.steps, 1)
+        answer = answers(replace(answer.setting, tolerance=None, step=step))
+        apart = max(apart, distance(fine, answer).size)
+    return answer, apart
 
 
 # --- dimensionless numbers --------------------------------------------------------------------------------------------
@@ -375,20 +500,20 @@ MEANING = {
 
 def groups(of: Explanation) -> dict[str, float]:
     """Return name ↦ number, those that a case has; `MEANING` says what they are."""
-    system, time, problem = of.system, of.scene.time, of.problem
-    structure, tips = problem.structure, of.pairs.get(HISTORY) or of.pairs.get(STEADY)
-    values = np.empty(0) if MODES not in of.pairs else of.pairs[MODES].own[1].output.values
-    # Neither a mesh file's plate nor any other structure need have a length of its own.
-    length = float(getattr(structure, "length", None) or system.structure.length)
-    at_rest = _frequencies_at_rest(of)
+    system, time, problem = of._switched(of.problem), of.scene.time, of.problem
+    structure, out = problem.structure, dict[str, float]()
+    length = float(getattr(structure, "length", None) or system.structure.length)  # a mesh file has none
+    at_rest = _frequencies_at_rest(system, of.scene.modes.count)
+    values = of.whole[MODES][0].output.values if MODES in of.whole else 1j * at_rest
     first = float(at_rest[0]) if at_rest.size else 0.0
-    speeds, rates = _turning(of)
-    out = {"speed_ratio": float(np.abs(speeds).max()) / first} if first > 0.0 else {}
+    speeds, rates = of.turning
+    if first > 0.0:
+        out["speed_ratio"] = float(np.abs(speeds).max()) / first
     if system.structure.radius > 0.0:
         out["slenderness"] = length / system.structure.radius
-    if tips is not None:
-        answer = tips.own[1]
-        out |= {"deflection": answer.output.scale / length, "rotation": getattr(answer.outcome, "size", 0.0)}
+    if tips := of.whole.get(HISTORY) or of.whole.get(STEADY):
+        found: Any = tips[0].outcome
+        out |= {"deflection": found.output.scale / length, "rotation": found.size}
     root = getattr(structure, "root_position", structure.hub_radius)
     out["hub_ratio"] = float(np.linalg.norm(root)) / length
     if first > 0.0:
@@ -397,42 +522,26 @@ def groups(of: Explanation) -> dict[str, float]:
         out["damping"] = float(-values[0].real / abs(values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
-    if time is not None and time.step is not None and (at_rest.size or len(values)):
-        fastest = float(np.abs(values).max()) if len(values) else float(at_rest[-1])
-        out["steps_per_period"] = 2 * np.pi / fastest / time.step
+    if time is not None and time.step is not None and len(values):
+        out["steps_per_period"] = 2 * np.pi / float(np.abs(values).max()) / time.step
     return out
 
 
-def _frequencies_at_rest(of: Explanation) -> Array:
+def _frequencies_at_rest(system: System, count: int) -> Array:
     """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
-    system = of.system
-    system.set_time(0.0, of.problem.motion.at_speed(0.0))
+    system.set_time(0.0, system.motion.at_speed(0.0))
     system.set_state(system.zeros())
     try:
-        return np.sort(np.abs(Pencil(*system.mass_damping_stiffness()).solve(max(2, of.scene.modes.count)).resolved))
+        return np.sort(np.abs(Pencil(*system.mass_damping_stiffness()).solve(max(2, count)).resolved))
     except ComputationError:
         return np.empty(0)
 
 
-def _turning(of: Explanation) -> tuple[Array, Array]:
-    """Return Ω and dΩ/dt at some times of the motion; of a free hub those of the rigid structure."""
-    motion, end = of.problem.motion, of.scene.time.end if of.scene.time is not None else 0.0
-    times = np.linspace(0.0, max(end, motion.settled), 401)
-    if motion.hub is None:
-        return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-    speeds = motion.hub.rigid_speeds(np.asarray(times), of.system.row.rest_inertia())
-    return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
-
-
-def _added_mass(system: Any, effect: str) -> float:
+def _added_mass(system: System, effect: str) -> float:
     """Return the masses that an effect brings, as a share of the mass of the structure without them."""
-    switch = system.structure.constant(1.0)
-    bodies = [b for b in system.structure.bodies((effect,)) if b.is_position]
-    mass = forms.form(sum((switch if b.effect == effect else 1.0) * b.density * b.measure for b in bodies), once=True)
-
-    def total() -> float:
-        return float(system.comm.allreduce(float(fem.assemble_scalar(mass))))
-
-    whole = total()
-    switch.value = 0.0
-    return whole / total() - 1.0
+    switch, bodies = system.structure.constant(1.0), system.structure.bodies((effect,))
+    parts = [(switch if b.effect == effect else 1.0) * b.density * b.measure for b in bodies if b.is_position]
+    mass, totals = forms.form(sum(parts), once=True), list[float]()
+    for switch.value in (1.0, 0.0):
+        totals.append(system.comm.allreduce(float(fem.assemble_scalar(mass))))
+    return totals[0] / totals[1] - 1.0

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.equations.system import System
 from rotfem.results.files import whole_hdf5, write_whole
 from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
@@ -45,7 +46,7 @@ class Snapshots:
         self._count += 1
 
 
-def fields_writer(system: Any, states: list[tuple[float, Array]], more: Named | None = None) -> Writer:
+def fields_writer(system: System, states: list[tuple[float, Array]], more: Named | None = None) -> Writer:
     """Return what writes fields.xdmf and fields.h5 of a run into a folder, on all ranks together.
 
     States are (time in s, local dof array); `more` has further fields at the same times.
@@ -80,7 +81,7 @@ def moved(structure: Any, values: Array) -> Array:
     return out
 
 
-def stations_writer(system: Any, stations: StationHistory) -> Callable[[Path], list[Path]]:
+def stations_writer(system: System, stations: StationHistory) -> Callable[[Path], list[Path]]:
     """Return what writes stations.xdmf: displacements, section forces and strains on the line through the stations."""
     structure, every = system.structure, 1 + (len(stations.t) - 1) // MOST_STATES
     points = structure.places({"x": stations.x})

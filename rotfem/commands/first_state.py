@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +12,7 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.stability import Stability, constant_stability, stability_of
 from rotfem.commands.problem import first_motion
 from rotfem.equations.compiled import compile_system, with_all_unknowns
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
@@ -41,7 +41,7 @@ class Start:
     warnings: list[str] = field(default_factory=list)
 
 
-def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True) -> Start:
+def first_state(scene: Scene, problem: Problem, system: System, judged: bool = True) -> Start:
     """Return what the history of a scene starts from."""
     initial, newton, start = scene.initial, Newton.of(scene.solver), Start()
     if initial.state == "steady":
@@ -58,7 +58,7 @@ def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True
     return start
 
 
-def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> Start:
+def _equilibrium(scene: Scene, problem: Problem, system: System, judged: bool) -> Start:
     """Return the equilibrium under the speed, loads and pitch of t = 0 (see `first_state`); undeformed without any."""
     solver, start, speed = scene.solver, Start(), problem.motion.speed(0.0)
     if problem.frame == "inertial":
@@ -69,7 +69,7 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> S
         if not system.residual().norm() > 0.0:  # nothing acts on it
             return start
 
-    def found(system: Any, notes: list[str]) -> Array:
+    def found(system: System, notes: list[str]) -> Array:
         return steady_state(system, speed, Newton.of(solver), notes=notes)
 
     try:

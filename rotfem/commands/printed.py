@@ -19,8 +19,11 @@ def report(result: Result) -> list[str]:
     s = result.summary
     tables = [line for table in result.tables() for line in table.lines()]
     before, after = _AROUND[s["command"]](s)
-    known = s.get("scene", {}).get("output", {}).get("error", True)
+    scene = s.get("scene", {})
+    known = scene.get("output", {}).get("error", True)
     unknown = [] if known else ["error: not estimated, as output.error = false"]
+    if scene.get("model", {}).get("effects") == "needed" and "needed" not in s:
+        before.append('all effects are in: model.effects = "needed" chooses them for the tip in rotfem run alone')
     return [*before, *shared(s), *tables, *(of_error(s) if "error" in s else unknown), *after]
 
 

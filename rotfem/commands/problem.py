@@ -20,6 +20,7 @@ from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
@@ -48,7 +49,7 @@ class Moment:
         t: time, s.
     """
 
-    def __init__(self, system: Any, state: State):
+    def __init__(self, system: System, state: State):
         self.system, self.state, self.t = system, state, state.t
 
     def __repr__(self) -> str:
@@ -110,7 +111,7 @@ class Moment:
         return self.system
 
 
-def hub_values(system: Any, state: State) -> dict[str, float]:
+def hub_values(system: System, state: State) -> dict[str, float]:
     """Return the values of a free hub at a state that is written into the system (see `Moment.hub`)."""
     row = system.row
     if row is None:
@@ -120,7 +121,7 @@ def hub_values(system: Any, state: State) -> dict[str, float]:
     return {**own, "angular_momentum": row.angular_momentum(), "impulse": impulse, "work": work}
 
 
-def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
+def first_shape(system: System, start: Array | Moment | None) -> Array | None:
     """Return the shape that a motion starts from (local dof array), and set the reference rotation of the system."""
     if start is None:
         return None

@@ -19,10 +19,12 @@ from rotfem.analysis.stability import Stability
 from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations
+from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import computing
 from rotfem.mechanics.theories import Theory, richest, theories
-from rotfem.results.run import RunResult, StationHistory, Table
+from rotfem.results.files import Table
+from rotfem.results.run import RunResult, StationHistory
 from rotfem.scene.settings import OutputTable
 from rotfem.units import speed_text
 
@@ -66,7 +68,7 @@ class Monitor:
         stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
     """
 
-    def __init__(self, system: Any, critical: float | None):
+    def __init__(self, system: System, critical: float | None):
         self.system, self.critical = system, critical
         self.since: float | None = None
         self.farthest = Farthest(system)
@@ -141,7 +143,7 @@ class ResultantRows:
         largest: largest equivalent stress (Pa) so far, where, and when: value, x, y (m), t (s).
     """
 
-    def __init__(self, system: Any, names: tuple[str, ...]):
+    def __init__(self, system: System, names: tuple[str, ...]):
         self.names = names
         self._resultants = PlateResultants(system)
         self._nodes = system.structure.nodes(system.zeros())[0]
@@ -181,7 +183,7 @@ class StationRows:
         seen: rows of the history so far.
     """
 
-    def __init__(self, system: Any, output: OutputTable):
+    def __init__(self, system: System, output: OutputTable):
         self.output, beam = output, system.structure
         self._stations = Stations(system, output.positions(beam.length))
         self.names = (*output.sections(beam.type), *beam.components)
@@ -215,7 +217,7 @@ class Recorder:
         InputError: an output of a user has the name of a column.
     """
 
-    def __init__(self, system: Any, output: OutputTable):
+    def __init__(self, system: System, output: OutputTable):
         self.system = system
         names = tuple(f"tip_{c}" for c in system.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
@@ -275,7 +277,7 @@ class Recorder:
             self.system.count_rotations_from(self._last.reference)
             self.system.set_time(self._last.t)
             self.system.set_state(self._last.q, self._last.v, self._last.a)
-        shape = self.system.shape() if len(self.history) else {}
+        shape = self.system.shape() if self.history.rows else {}
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()

@@ -116,7 +116,7 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
         system.set_state(q)
         forces.append(system.residual().array.copy())  # −F: loads push with their sign
         held.append(system.clamp_forces())
-        moments.append(-analysis.system.row.work() if analysis.free else 0.0)
+        moments.append(0.0 if system.row is None else -system.row.work())
     force, push, moment = (parts[1] - parts[0] + 1j * (parts[2] - parts[0]) for parts in (forces, held, moments))
     outputs = [tip_output(system), root_output(system, push)]
     if analysis.free:

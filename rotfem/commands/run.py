@@ -88,7 +88,7 @@ class Simulation:
         if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))
         self.problem, there = problem, communicator(problem, self.comm)
-        self.system: Any = compile_system(problem, there, moving=scene.time is not None)
+        self.system = compile_system(problem, there, moving=scene.time is not None)
         if times is None:
             self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
@@ -352,9 +352,9 @@ def run(
             done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
             if error.result is not None:
-                results.write(error.result, plots=False)
+                error.result.write_into(results)
             raise
-        problems = results.write(done, plots=False)
+        problems = done.write_into(results)
         if problems:
             raise problems[0]
         return done

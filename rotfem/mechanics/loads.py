@@ -168,17 +168,6 @@ class Load:
         """Whether it is linear between its knots."""
         return all(term.linear for term in self.terms)
 
-    @cached_property
-    def stations(self) -> tuple[float, ...]:
-        """Places along the span (m) at which it has kinks or jumps."""
-        return tuple(sorted({float(x) for term in self.terms if term.shapes.x is not None for x in term.shapes.x}))
-
-    @cached_property
-    def jumps(self) -> tuple[float, ...]:
-        """Stations (m) at which it may jump: double ones, and the ends."""
-        tables = [term.shapes.x for term in self.terms if term.shapes.x is not None]
-        return tuple(sorted({float(v) for x in tables for v in (x[0], *x[1:][np.diff(x) == 0.0], x[-1])}))
-
     def many(self, t: Array) -> Array:
         """Return the components of a uniform load, else all amplitudes, at times (n,), shape (n, components)."""
         if self.is_uniform:
@@ -247,14 +236,21 @@ class Loads:
         return cls(given.gravity, named, tuple(point.x for point in given.at))
 
     @property
+    def tables(self) -> list[Array]:
+        """Stations (m) of all shapes over the span."""
+        terms = (term for load in self.named.values() for term in load.terms)
+        return [term.shapes.x for term in terms if term.shapes.x is not None]
+
+    @property
     def stations(self) -> set[float]:
         """Places along the structure (m) of kinks, jumps and point loads."""
-        return {x for load in self.named.values() for x in load.stations} | self.jumps
+        return {float(x) for table in self.tables for x in table} | self.jumps
 
     @property
     def jumps(self) -> set[float]:
-        """Places along the structure (m) of jumps and point loads."""
-        return {x for load in self.named.values() for x in load.jumps} | {p[0] for p in self.places if len(p) == 1}
+        """Places along the structure (m) of point loads, of double stations, and of the first and last."""
+        ends = {float(v) for x in self.tables for v in (x[0], *x[1:][np.diff(x) == 0.0], x[-1])}
+        return ends | {place[0] for place in self.places if len(place) == 1}
 
     def replaced(self, changed: Mapping[str, Load]) -> Loads:
         """Return the loads with some of them replaced, by name."""

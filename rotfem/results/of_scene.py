@@ -162,8 +162,7 @@ class ExplainResult(Rows):
         summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
         rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate`
             (output ↦ relative change; None where it is unknown, below `summary["resolution"]` round-off), `worst`,
-            `verdict`; `bounds`, outputs whose change is only known to be below the estimate; with a check `truth`
-            (output ↦ relative change in the scene's own setting).
+            `verdict`; with a check `truth` (output ↦ relative change in the scene's own setting).
     """
 
     index = ("name",)
@@ -225,7 +224,7 @@ class ExplainResult(Rows):
             return "–" if row["verdict"] == "not available" else "unknown"
         if 0.0 < estimate < resolution:
             return "<" + per_cent(resolution)
-        return ("<" if output in row.get("bounds", ()) else "") + per_cent(estimate)
+        return per_cent(estimate)
 
     def flat_rows(self) -> list[Row]:
         """Return one row an effect and a theory; changes are columns `estimate_…` and `truth_…`."""

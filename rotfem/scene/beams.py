@@ -30,10 +30,10 @@ from rotfem.scene.values import (
     Rows,
     Span,
     Vector,
+    check_on_span,
     check_profile_length,
     check_span,
     check_start,
-    on_span,
     symmetric,
 )
 
@@ -72,10 +72,6 @@ class PointMass(SceneModel):
     def inertia_matrix(self) -> Array:
         """Inertia tensor (kg·m²), shape (3, 3)."""
         return _as_matrix(self.inertia)
-
-    def _check(self) -> None:
-        if self.mass == 0.0 and not np.any(self.inertia_matrix):
-            raise problem("mass", self.mass, "give mass, inertia, or both")
 
 
 class BeamStructure(StructureTable):
@@ -138,8 +134,7 @@ class BeamStructure(StructureTable):
             check_profile_length(f"section.{name}", taper, self.length, slack)
         for i, body in enumerate(self.masses):
             key = f"masses.{i}"
-            if not on_span(body.x, self.length):
-                raise problem(f"{key}.x", body.x, f"must be from 0 to the length {self.length:g}")
+            check_on_span(f"{key}.x", body.x, self.length)
             if self.is_planar and body.offset[2] != 0.0:
                 raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
             if self.is_planar and not isinstance(body.inertia, float):
@@ -288,8 +283,7 @@ class SpatialBeamStructure(BeamStructure):
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
         straight = self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
         for i, support in enumerate(self.supports):
-            if not on_span(support.x, self.length):
-                raise problem(f"supports.{i}.x", support.x, f"must be from 0 to the length {self.length:g}")
+            check_on_span(f"supports.{i}.x", support.x, self.length)
         if self.supports and not straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
             raise problem("supports", None, why)

@@ -14,7 +14,16 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, Validation
 
 from rotfem.scene.files import is_path, read_rows
 from rotfem.scene.table import LISTED, SceneModel, in_units, problem, problems_at, unit
-from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, Rows, check_increasing, check_span, on_span
+from rotfem.scene.values import (
+    Matrix,
+    Number,
+    PaddedVector,
+    Positive,
+    Rows,
+    check_increasing,
+    check_on_span,
+    check_span,
+)
 
 
 def arguments(function: Callable[..., Any]) -> int:
@@ -334,10 +343,6 @@ class PointLoad(SceneModel):
     moment: MomentTable | None = None
     kind: Kind = "dead"
 
-    def _check(self) -> None:
-        if self.force is None and self.moment is None:
-            raise problem("force", None, "give force, moment, or both")
-
 
 class LoadsTable(SceneModel):
     """The [loads] table.
@@ -386,9 +391,8 @@ def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) 
             _check_moment(key, structure, load)
         if isinstance(load, SpanLoad) and load.table is not None:
             _check_table(key, structure, load.table, timed)
-        for x in (x for x, _ in load.vectors if x is not None and not on_span(x, structure.length)):
-            why = f"is not on the structure, which runs from 0 to {structure.length:g}"
-            raise problem(key, None, f"x = {x:.10g} {why}")
+        for x in (x for x, _ in load.vectors if x is not None):
+            check_on_span(f"{key}.{next(iter(load.given), 'harmonic')}", x, structure.length)
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
         if free_hub and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
@@ -437,5 +441,4 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
     if len(x) != (2 if structure.type == "plate" else 1):
         allowed = "[x, y], m, for a plate" if structure.type == "plate" else f"a number, m, for a {structure.type}"
         raise problem(key, list(x), f"must be {allowed}")
-    if not on_span(x[0], structure.length):
-        raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
+    check_on_span(key, x[0], structure.length)

@@ -20,10 +20,10 @@ from rotfem.scene.values import (
     ShearCorrection,
     Tapered,
     Vector,
+    check_on_span,
     check_profile_length,
     check_start,
     evaluate,
-    on_span,
 )
 
 #: A number, a taper (of a mesh from anywhere), or region ↦ number.
@@ -125,10 +125,8 @@ class PlateStructure(StructureTable):
             with problems_at("thickness", self.thickness):
                 check_start(self.thickness)
             check_profile_length("thickness", self.thickness, self.length)
-        for x, _, _ in self.point_masses:
-            if not on_span(x, self.length):
-                reason = f"x = {x:.10g} is not on the plate, which runs from 0 to {self.length:g}"
-                raise problem("point_masses", self.point_masses, reason)
+        for i, (x, _, _) in enumerate(self.point_masses):
+            check_on_span(f"point_masses.{i}.0", x, self.length)
         if material.name == "orthotropic" and self.E1 is not None and self.E2 is not None and self.nu12 is not None:
             limit = math.sqrt(self.E1 / self.E2)
             if abs(self.nu12) >= limit:

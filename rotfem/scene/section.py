@@ -11,7 +11,6 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -194,9 +193,6 @@ class Section(SceneModel):
             dimensions = self._dimensions(np.array(self.knots))
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
-            for name, values in asdict(self._geometry(np.array(self.knots))).items():
-                if name not in ("centroid", "shear_center") and not np.all(np.greater_equal(values, 0.0)):
-                    raise problem("shape", self.shape, f"gives {name} = {np.min(values):g}; must be positive")
 
 
 def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
@@ -227,9 +223,6 @@ def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
 
 def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:
     """Return the table of a section with the columns of its file in the place of that; `path` is before its keys."""
-    for key, why in (("from", "is only of a spatial_beam"), ("format", "has no meaning without section.from")):
-        if key in section:
-            raise problem(f"{path}{key}", section[key], why)
     given = {key: value for key, value in section.items() if key != "file"}
     if "file" not in section:
         return given

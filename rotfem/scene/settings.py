@@ -19,8 +19,8 @@ from rotfem.scene.values import (
     Positive,
     WithParameters,
     check_increasing,
+    check_on_span,
     increasing,
-    on_span,
     parameters_of,
 )
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
@@ -411,6 +411,5 @@ class OutputTable(SceneModel):
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)
             raise problem("output.stations", shown, f"are places along a beam; a {kind} has none")
-        outside = [x for x in self.positions(length) if not on_span(x, length)]
-        if outside:
-            raise problem("output.stations", outside[0], f"must be from 0 to the length {length:g} m")
+        for x in self.positions(length):
+            check_on_span("output.stations", x, length)

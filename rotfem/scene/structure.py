@@ -289,10 +289,6 @@ class SupportTable(SceneModel):
     stiffness: Annotated[TwoByTwo, unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
     damping: Annotated[TwoByTwo, unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
 
-    def _check(self) -> None:
-        if not np.any(self.stiffness) and not np.any(self.damping):
-            raise problem("stiffness", None, "give stiffness, damping, or both")
-
     @property
     def isotropic(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """(a, b) of the part [[a, b], [−b, a]] of stiffness and damping, which every rotating frame sees alike."""

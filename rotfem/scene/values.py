@@ -131,17 +131,19 @@ def symmetric(size: int, definite: bool) -> AfterValidator:
     Symmetry is to 1e-9 of the largest entry.
     """
 
+    def fits(rows: Any) -> bool:
+        if [len(row) for row in rows] != [size] * size:
+            return False
+        matrix = np.array(rows)
+        even = np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUND_OFF * np.max(np.abs(matrix)))
+        return even and is_positive(matrix, definite)
+
     def check(value: Any) -> Any:
         table = is_table(value) and isinstance(value[0][1], tuple)
         for x, rows in value if table else [(None, value)]:
-            shape = f"{'' if x is None else f'at x = {x:g} it '}must be a symmetric {size}×{size} matrix"
-            if [len(row) for row in rows] != [size] * size:
-                raise problem("", None, shape)
-            matrix = np.array(rows)
-            if not np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUND_OFF * np.max(np.abs(matrix))):
-                raise problem("", None, f"{shape}; it is not symmetric")
-            if not is_positive(matrix, definite):
-                raise problem("", None, f"{shape}, positive {'definite' if definite else 'semidefinite'}")
+            if not fits(rows):
+                kind = f"a symmetric {size}×{size} matrix, positive {'definite' if definite else 'semidefinite'}"
+                raise problem("", None, f"{'' if x is None else f'at x = {x:g} it '}must be {kind}")
         return value
 
     return AfterValidator(check)
@@ -182,9 +184,10 @@ def evaluate(value: Any, x: npt.ArrayLike) -> Array:
     return np.asarray(values.reshape((*positions.shape, *entries.shape[1:])))
 
 
-def on_span(x: float, length: float | None) -> bool:
-    """Return whether x (m) is from 0 to the length of a structure, but for round-off; True if that is not known."""
-    return length is None or -ROUND_OFF <= x / length <= 1 + ROUND_OFF
+def check_on_span(key: str, x: float, length: float | None) -> None:
+    """Refuse a place x (m) beside a structure of a length (m), but for round-off; none is where that is not known."""
+    if length is not None and not -ROUND_OFF <= x / length <= 1 + ROUND_OFF:
+        raise problem(key, x, f"must be from 0 to the length {length:g}")
 
 
 def check_profile_length(key: str, profile: float | Matrix, length: float, slack: float = ROUND_OFF) -> None:
@@ -237,8 +240,6 @@ class WithParameters(SceneModel):
         key, defaults = cls.CHOICE, dict[str, Any]()
         name = as_name(data.get(key), cls.ENTRIES, key)
         for parameter, field in parameters_of(cls.ENTRIES[name]).items():
-            if parameter in cls.model_fields:
-                raise problem(key, name, f"cannot have a parameter {parameter}, which is a key of the table already")
             if field.default is not dataclasses.MISSING:
                 defaults[parameter] = field.default
             elif parameter not in data:

@@ -90,7 +90,7 @@ class PointValues:
         own = (local >= 0) & (local < nodes.size_local) & (weights != 0.0)
         self.dofs, self.weights = local[own, None] * size + np.arange(size), weights[own]
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, values: npt.NDArray[Any]) -> Array:
         """Return the values (block size,) at the point of a local dof array of the space, or of its owned part."""
         return np.asarray(summed(self._comm, self.weights @ values[self.dofs]))
 

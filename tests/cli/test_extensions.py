@@ -74,6 +74,7 @@ def at_rest(path: Path) -> None:
     path.write_text(SCENE.replace("duration = 2.0\n", "").split("[time]")[0])
 
 
+<<<<<<< HEAD
 def test_theory(rotfem: Rotfem) -> None:
     """½ u₂'² against the stretch: they differ by the square of the deflection over L, and only for what bends."""
     changes = ("time.end=1.0", "motion.speed=2.0")
@@ -106,9 +107,14 @@ def test_scheme(rotfem: Rotfem) -> None:
     ],
 )
 def test_section(rotfem: Rotfem, shape: str, dimensions: str, centre: float, area: float) -> None:
+=======
+def test_section(rotfem: Rotfem) -> None:
+>>>>>>> main
     """Mass and centre of mass: ρ A L; the centroid of a channel is off the line that the web stands on."""
+    shape, dimensions = "channel", "web = 0.2\nflange = 0.1\nthickness = 0.01\n"
     head, tail = SCENE.replace("planar_beam", "spatial_beam").split("EA =")[0], SCENE[SCENE.index("[motion]") :]
     Path("beam.toml").write_text(f'{head}E = 7e10\nnu = 0.3\nrho = 2700.0\nshape = "{shape}"\n{dimensions}{tail}')
+<<<<<<< HEAD
     found = summary(rotfem, shape, "check")
     assert found["mass"] == pytest.approx(2700 * area * 10)
     assert found["center_of_mass"] == pytest.approx([5.0, centre, 0.0], abs=1e-12)
@@ -132,6 +138,11 @@ def test_output(rotfem: Rotfem) -> None:
     keys = ("output.quantities=['root_moment']", "model.theory=linear", "loads.tip_force=[0, 100]")
     summary(rotfem, "root_moment", "run", *STILL, *keys)
     assert column("root_moment") == pytest.approx([1000.0], rel=1e-6)
+=======
+    found = summary(rotfem, "--load", shape, "check")
+    assert found["mass"] == pytest.approx(2700 * 4e-3 * 10)
+    assert found["center_of_mass"] == pytest.approx([5.0, 0.01 / 0.4, 0.0], abs=1e-12)
+>>>>>>> main
 
 
 def test_importer(rotfem: Rotfem, folder: Path) -> None:
@@ -158,6 +169,7 @@ def test_motion_law(rotfem: Rotfem, folder: Path) -> None:
     assert (refused.status, 'did you mean "amplitude"?' in refused.err) == (2, True)
 
 
+<<<<<<< HEAD
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_damping(rotfem: Rotfem, theory: str) -> None:
     """ζ = ηω/2 of modes that bend, but for shear, and 0 of those that stretch, in linear and nonlinear theories."""
@@ -165,6 +177,14 @@ def test_damping(rotfem: Rotfem, theory: str) -> None:
     eta = 1e-3
     keys = (f"model.theory={theory}", f"structure.damping.bending_damping={eta}", "modes.count=8")
     found = summary(rotfem, "bending_damping", "modes", *STILL, *keys)
+=======
+def test_damping(rotfem: Rotfem) -> None:
+    """ζ = ηω/2 of modes that bend, but for shear, and 0 of those that stretch, in linear and nonlinear theories."""
+    at_rest(Path("beam.toml"))
+    eta = 1e-3
+    keys = ("model.theory=consistent_linear", f"structure.damping.bending_damping={eta}", "modes.count=8")
+    found = summary(rotfem, "--load", "bending_damping", "modes", *STILL, *keys)
+>>>>>>> main
     for row in found["modes"]:
         expected = eta * row["frequency"] / 2 * (row["share_lag"] > 0.5)
         assert row["damping"] == pytest.approx(expected, rel=0.04, abs=1e-9)
@@ -175,8 +195,13 @@ def test_design(rotfem: Rotfem, folder: Path) -> None:
     """A propeller is a spatial beam of the diameter; its parameters are keys that --set changes."""
     text = '[structure]\ntype = "propeller"\ndiameter = 0.2\npitch = 0.1\nE = 6e10\nrho = 1600.0\n'
     (folder / "prop.toml").write_text(text + '[motion]\ntype = "constant"\nspeed = 0.0\n')
+<<<<<<< HEAD
     assert summary(rotfem, "propeller", "check", scene="prop.toml")["length"] == pytest.approx(0.085)
     found = summary(rotfem, "propeller", "check", "structure.diameter=0.4", scene="prop.toml")
+=======
+    assert summary(rotfem, "--load", "propeller", "check", scene="prop.toml")["length"] == pytest.approx(0.085)
+    found = summary(rotfem, "--load", "propeller", "check", "structure.diameter=0.4", scene="prop.toml")
+>>>>>>> main
     assert found["length"] == pytest.approx(0.17)
     refused = rotfem("check", "prop.toml", "--set", "structure.diametr=1")
     assert (refused.status, 'did you mean "diameter"?' in refused.err) == (2, True)
@@ -202,9 +227,7 @@ def test_scene_loads_a_file_beside_it(rotfem: Rotfem, folder: Path) -> None:
     [
         (None, "no such file"),
         ("x = 1\ny = 1 / 0\n", "failed: line 2: ZeroDivisionError: division by zero"),
-        ("def f(:\n", "failed: line 1: SyntaxError"),
         ("import rotfem\nrotfem.register(rotfem.Effect('gravity'))\n", "failed: line 2: ValueError: 'gravity' is the"),
-        ("raise SystemExit(0)\n", "failed: line 1: SystemExit"),
     ],
 )
 @pytest.mark.parametrize("by", ["--load", "extensions.load"])
@@ -241,13 +264,3 @@ def test_what_is_registered_fails_later(rotfem: Rotfem, folder: Path, content: s
     assert done.status == 2
     assert done.err.startswith(f"rotfem: {message}")
     assert done.err.count("\n") == 1
-
-
-def test_shape_with_a_negative_property(rotfem: Rotfem, folder: Path) -> None:
-    shape = "rotfem.Shape('bad', ('side',), lambda nu, side: rotfem.Geometry(side**2, -side, side, side, side))"
-    (folder / "mine.py").write_text(f"import rotfem\nrotfem.register({shape})\n")
-    section = "structure.section={E=7e10, nu=0.3, rho=2700, shape='bad', side=0.1}"
-    done = rotfem("--load", "mine.py", "check", "beam.toml", "--set", section, "-o", "out")
-    assert done.status == 2
-    assert "structure.section.shape" in done.err
-    assert "second_moment2 = -0.1; must be positive" in done.err

@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import tomli_w
-
 from tests.pairs.covering import Levels, Row
 
 Tables = dict[str, Any]
@@ -171,20 +169,3 @@ def loads_of(row: Row) -> Tables:
         "follower": {"tip_force": {"value": across, "kind": "follower"}},
         "function": {"tip_force": gust},
     }[row["loads"]]
-
-
-def as_toml(row: Row, tables: Tables) -> str:
-    """Return a scene as a user would have it in a file, its choices and what only Python can say as comments."""
-    said = [f"# rotfem {row['command']} on {row['ranks']} rank(s): {row}"]
-
-    def plain(value: Any, key: str = "") -> Any:
-        if isinstance(value, dict):
-            kept = {name: plain(entry, f"{key}.{name}".lstrip(".")) for name, entry in value.items()}
-            return {name: entry for name, entry in kept.items() if entry is not None}
-        if callable(value):
-            said.append(f"# {key} = {value.__module__}.{value.__name__}")
-            return None
-        return value
-
-    text = tomli_w.dumps(plain(tables))
-    return "\n".join([*said, text])

@@ -1,6 +1,6 @@
 """Features that meet: every pair of choices in scenes that are computed every day, every triple at night.
 
-What is held of every scene is said in `tests.pairs.answers`; one that fails is printed as a file. Source: covering
+What is held of every scene is said in `tests.pairs.answers`; one that fails is printed. Source: covering
 arrays (Cohen, Dalal, Fredman & Patton, IEEE Trans. Softw. Eng. 23 (1997) 437).
 """
 
@@ -22,7 +22,7 @@ from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Row, completed, covering
 from tests.pairs.refusals import REFUSALS, UNTRIED, Refusal
-from tests.pairs.scenes import ACTIVE, LEVELS, PLAIN, TOLERANCE, as_toml, tables_of
+from tests.pairs.scenes import ACTIVE, LEVELS, PLAIN, TOLERANCE, tables_of
 
 CONFLICTS = [*(refusal.choices for refusal in REFUSALS), *UNTRIED]
 #: Error of an answer on two processes, of adaptive steps, which may be others then, and of one to an accuracy.
@@ -44,7 +44,7 @@ def test_pairs(row: Row, tmp_path: Path) -> None:
         result = answer(row, tmp_path)
         check_answer(row, result, tmp_path)
     except Exception as error:
-        raise AssertionError(f"{error}\n{as_toml(row, tables_of(row))}") from error
+        raise AssertionError(f"{error}\n{row}\n{tables_of(row)}") from error
     if row["ranks"] == "2":
         ALONE.append((row, answers(columns_of(result))))
 
@@ -60,7 +60,7 @@ def test_two_processes(tmp_path: Path) -> None:
     for number, (row, alone) in enumerate(ALONE):
         with np.load(tmp_path / f"{number}.npz") as file:
             there = answers(dict(file))
-        check_same(alone, there, DIGITS.get(row["time"], 1e-5), as_toml(row, tables_of(row)))
+        check_same(alone, there, DIGITS.get(row["time"], 1e-5), str(row))
 
 
 def answers(columns: dict[str, Any]) -> dict[str, Any]:
@@ -89,4 +89,4 @@ def test_refusals(refusal: Refusal, tmp_path: Path) -> None:
     for row in rows:
         with pytest.raises((InputError, ComputationError)) as caught:
             answer(row, tmp_path)
-        assert re.search(refusal.says, str(caught.value)), as_toml(row, tables_of(row))
+        assert re.search(refusal.says, str(caught.value)), row

@@ -108,7 +108,7 @@ structure.section={E=2e11, nu=0.3, rho=7800, shape='tube', outer_radius=1, inner
 structure.section={E=1, nu=0, rho=1, shape='tube', outer_radius=[[0,2],[10,1]], inner_radius=1.5} -> outer_radius
 structure.section={E=2e11, nu=0.6, rho=7800, shape='circle', radius=1} -> at most 0.5
 structure.section={E=2e11, nu=0.3, rho=7800, shape='circel', radius=1} -> did you mean "circle"
-loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> x = 11
+loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> @loads.distributed.over_span 11.0: must be from 0 to the length
 loads={distributed={over_span=[[0,0],[10,1]]}} -> row 1 has 2 entries
 loads={distributed={over_span=[[0,0,0],[5,0,1]], value=[0,1]}} -> exactly one of
 loads={distributed={over_span=[[0,0,0],[5,0,1],[4,0,1]]}} -> row 3: 4 < 5
@@ -119,7 +119,6 @@ loads={tip_force={over_span=[[0,0,0],[5,0,1]]}} -> unknown key
 loads={pressure=1.0} -> needs a plate
 loads={at=[{x=10.1, force=[0,1]}]} -> from 0 to the length
 loads={at=[{x=[1,2], force=[0,1]}]} -> must be a number
-loads={at=[{x=1.0}]} -> force, moment, or both
 loads={at=[{x=1.0, moment=[0,0,1]}]} -> one component
 loads={at={x=1.0, force=[0,1]}} -> must be a list
 loads={tip_force={harmonic={amplitude=[0,1]}}} -> frequency and per_rev
@@ -134,18 +133,17 @@ structure.damping.modal={lag=[0.1,1.0]} -> @structure.damping.modal.lag.1 less t
 loads.tip_force.harmonic={amplitude=['a',1], frequency=1} -> @loads.tip_force.harmonic.0.amplitude must be a number
 structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
-structure.section.EA=nofile.csv -> file not found
 time={end=1.0, step=1e-20} -> @time.step round-off
-structure.section.from='x.dat' -> only of a spatial_beam
+structure.section.EA=nofile.csv -> file not found
+structure.section.from='x.dat' -> unknown key
 [spatial]
-structure.section.format='hawc2' -> no meaning without section.from
+structure.section.format='hawc2' -> unknown key
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
 structure.pretwist=[[0,0],[1,1]] -> it ends at 1
 structure.section.precone='a' -> must be a number
 structure.precone=0.1; structure.section.precone=0.1 -> given twice
 structure.hub_radius=1; structure.hub_offset=[1,0,0] -> either
-structure.supports=[{x=0}] -> @structure.supports.0.stiffness give stiffness
 structure.section.mass_center=[0.1] -> more entries
 structure.line=[[0,0,0],[1,0,0]]; structure.length=3 -> @structure.length arc length
 structure.tip_inertia=[[1,2],[2,1]] -> symmetric 3×3
@@ -161,7 +159,7 @@ structure.E1=1000000000.0 -> @structure cannot be combined
 structure.thickness={skin=0.1} -> needs a mesh
 structure.thickness=[[0,0.1],[1,0]] -> @structure.thickness.1.1 greater than 0
 structure.mesh='no.msh' -> file not found
-structure.point_masses=[[2,0,1]] -> not on the plate
+structure.point_masses=[[2,0,1]] -> @structure.point_masses.0.0 from 0 to the length
 structure.line_masses={tip=0} -> @structure.line_masses.tip greater than 0
 structure.line_masses=1.0 -> must be a table
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from rotfem.analysis.dense_output import RowTimes, between, multiples
+from rotfem.analysis.dense_output import between
 from rotfem.analysis.schemes import State
 
 
@@ -41,16 +41,3 @@ def test_what_holds_linearly_at_the_ends_holds_between() -> None:
     for state in between(*ends, [1.1, 1.25, 1.4], 4, MPI.COMM_SELF):
         assert state.q[2] == pytest.approx(state.q[0] + state.q[1], rel=1e-12)
         assert 0.1 <= state.q[1] <= 0.2
-
-
-def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
-    """Whether steps are longer or shorter; a row at the end of a step is the state itself."""
-    p = np.polynomial.Polynomial([0.0, 1.0])
-    rows, found, t = RowTimes(multiples(0.25, 2.1), 4, MPI.COMM_SELF), [], 0.0
-    for h in (0.1, 0.15, 0.9, 0.05, 0.9):
-        old, new = of_polynomial(p, t), of_polynomial(p, t := t + h)
-        rows(old, new)
-        found += rows.taken()
-    np.testing.assert_allclose([state.t for state in found], [*np.arange(0.25, 2.1, 0.25), 2.1], atol=1e-12)
-    assert found[0].q[0] == pytest.approx(0.25)
-    assert found[-1] is new

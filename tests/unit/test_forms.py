@@ -12,8 +12,6 @@ from dolfinx import fem, mesh
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
-from rotfem.commands.problem import Problem
-from rotfem.equations.compiled import compile_system
 from rotfem.numerics import forms
 from rotfem.numerics.forms import SAME_PATTERN, Assembler
 
@@ -61,30 +59,3 @@ def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> Non
         assert A.getInfo()["nz_used"] == assembled.pattern.getInfo()["nz_used"]
         A.axpy(-1.0, assembled(form), SAME_PATTERN)
         assert A.norm() == 0.0
-
-
-def test_a_large_flat_plate_has_no_entries_between_what_is_in_and_across_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """M, C and K are the same numbers; of 25 entries for each two nodes 4 in the plane and 9 across it stay.
-
-    Coriolis forces about an axis in the plane couple one of both.
-    """
-    from rotfem.equations import pieces
-
-    plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
-
-    def matrices(axis: list[int]) -> list[Any]:
-        motion = {"type": "constant", "speed": 77.0, "axis": axis}
-        model = {"theory": "consistent_linear"}
-        tables = {"structure": plate, "motion": motion, "model": model, "mesh": {"elements": [3, 2]}}
-        system = compile_system(Problem.of(tables).spinning(), moving=False)
-        system.set_time(0.0, system.motion.at_speed(77.0))
-        return list(system.mass_damping_stiffness())
-
-    for axis, part in (([0, 0, 1], 13 / 25), ([0, 1, 0], 15 / 25)):
-        monkeypatch.undo()
-        whole = matrices(axis)
-        monkeypatch.setattr(pieces, "SMALL", 0)
-        for A, B in zip(whole, matrices(axis), strict=True):
-            assert B.getInfo()["nz_used"] == pytest.approx(part * A.getInfo()["nz_used"])
-            entries = [X.convert("dense").getDenseArray() for X in (A, B)]
-            np.testing.assert_allclose(*entries, rtol=1e-12, atol=1e-15 * np.max(entries))

@@ -12,8 +12,7 @@ from rotfem.analysis.time_grid import find_jumps
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
 from rotfem.mechanics.differentiation import Derivative
-from rotfem.mechanics.loads import Load, Loads, Shapes, Term
-from rotfem.mechanics.pitch import Pitch, differentiated, tabulated_pitch, turn_about
+from rotfem.mechanics.pitch import Pitch, differentiated, tabulated_pitch
 from rotfem.mechanics.time_signals import TimeSignal
 from rotfem.scene import Scene
 
@@ -57,16 +56,6 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
     for t in (0.3, 1.1, 1.9):
         assert found.rate(t) == pytest.approx(rate(t), abs=1e-9)
         assert found.acceleration(t) == pytest.approx(acceleration(t), abs=1e-6)
-
-
-def test_a_function_may_have_its_rate_beside_it() -> None:
-    """The rate that is given is taken, and the acceleration is that of the rate: here of another angle than given."""
-    found = signal({"function": lambda t: 0.1 * t, "rate": lambda t: np.sin(300.0 * t)})
-    assert found.angle(0.7) == pytest.approx(0.07, rel=1e-14)
-    assert found.rate(0.7) == np.sin(210.0)
-    assert found.acceleration(0.7) == pytest.approx(300.0 * np.cos(210.0), rel=1e-9)
-    with pytest.raises(InputError, match="rate: the function of time, at 0.5, must return a number"):
-        signal({"function": lambda t: 0.1, "rate": lambda t: "fast"}).rate(0.5)
 
 
 def test_units() -> None:
@@ -113,21 +102,3 @@ def test_a_pitch_or_its_rate_that_jumps_is_refused(function: Any, at: float) -> 
     with pytest.raises(InputError, match="jumps at t = ") as caught:
         searched(function)
     assert float(str(caught.value).split("t = ")[1].split(" s")[0]) == pytest.approx(at, abs=1e-3)
-
-
-def test_dead_loads_keep_their_direction_in_the_hub() -> None:
-    """Amplitudes times shapes are Rᵀ f at every place, of the load itself as of one over the span."""
-    axis = np.array([0.6, 0.0, 0.8])
-    pitch = Pitch(lambda t: 0.2 + t, lambda t: 1.0, lambda t: 0.0, axis, np.zeros(3), start=0.2)
-    shapes = Shapes.along_span([[0.0, 1.0, 2.0, 3.0], [4.0, -1.0, 0.5, 0.0]])
-    given = Load("dead", (Term.table([[0, 1.0], [2, 3.0]], shapes),))
-    uniform = Load("dead", (Term(Shapes.uniform([(1.0, 2.0, 3.0)])),))
-    loads = Loads(named={"distributed": given, "tip_force": uniform}).pitched(pitch)
-    spread, same = loads.named["distributed"], loads.named["tip_force"]
-    assert isinstance(spread, Load)
-    assert isinstance(same, Load)
-    x, t = np.array([1.0, 3.0]), 0.7
-    fields = np.concatenate([term.shapes.along(x, x) for term in spread.terms])
-    exact = (1 + t) * shapes.along(x, x)[0] @ turn_about(axis, t)
-    np.testing.assert_allclose(np.tensordot(spread.at(t), fields, 1), exact, rtol=1e-14)
-    np.testing.assert_allclose(same.at(t), [1.0, 2.0, 3.0] @ turn_about(axis, t), rtol=1e-14)

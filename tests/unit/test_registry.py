@@ -267,17 +267,6 @@ def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
     assert wanted == message, "the tolerance is none that was given"
 
 
-def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
-    @dataclass(frozen=True)
-    class Clashing(OneStage):
-        name: ClassVar[str] = "clashing"
-        tolerance: float = 0.5
-
-    add(Clashing)
-    message = refusal(time={"end": 1, "step": 0.1, "scheme": "clashing"})
-    assert "cannot have a parameter tolerance, which is a key of the table already" in message
-
-
 # --- section shapes -------------------------------------------------------------------------------------------------
 
 ELLIPSE = Shape("ellipse", dimensions=("semi_axis_2", "semi_axis_3"), geometry=ellipse)

@@ -125,10 +125,3 @@ def test_a_burst_in_a_table_is_not_passed_over() -> None:
     fine = run({**scene, "time": {"end": 1.0, "step": 5e-4, "output_every": 10, "scheme": "esdirk4"}}).history
     found = run({**scene, "time": {"end": 1.0, "tolerance": 1e-2, "output_step": 5e-3}}).history
     assert np.max(np.abs(found["tip_u2"] - fine["tip_u2"])) < 1e-2 * np.max(np.abs(fine["tip_u2"]))
-
-
-def test_advice_where_steps_are_too_short() -> None:
-    tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"state": "undeformed"}}
-    time = {"end": 10.0, "tolerance": 1e-6, "min_step": 0.1}
-    with pytest.raises(rotfem.ComputationError, match="smaller time.min_step"):
-        run({**tables, "loads": {"tip_force": [0.0, 50.0]}, "time": time})

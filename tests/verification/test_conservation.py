@@ -262,15 +262,3 @@ def test_tangents_follow_the_speed(unit_beam: Any, theory: str) -> None:
     np.testing.assert_allclose(C2, 2 * C1, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(C0, 0, atol=1e-14)
     np.testing.assert_allclose(K2 - K0, 4 * (K1 - K0), rtol=0, atol=1e-12 * np.max(np.abs(K0)))
-
-
-@pytest.mark.parametrize("name", ["EA", "GA", "EI", "mass_per_length", "rotary_inertia"])
-def test_tangents_follow_the_section(unit_beam: Any, name: str) -> None:
-    """A section property is a constant of the compiled form: writing it changes residual and tangent alike."""
-    system = prepared(unit_beam({"model.theory": "reissner", "mesh": MESH}, motion=SPIN), 0.0)
-    before = matrices(system)
-    system.structure.section[name].value *= 2.0
-    after = matrices(system)
-    which = 0 if name in ("mass_per_length", "rotary_inertia") else 2
-    assert np.max(np.abs(after[which] - before[which])) > 1e-6 * np.max(np.abs(before[which]))
-    assert max(tangent_errors(system, 0.0).values()) < 1e-6

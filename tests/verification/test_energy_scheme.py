@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rotfem import registry, run
+from rotfem import run
 from rotfem.mechanics.theories import theories
 from rotfem.results import RunResult
 from rotfem.scene import Scene
@@ -117,10 +117,3 @@ def test_angular_momentum_on_a_free_hub() -> None:
         lost.append([np.ptp(momentum) / 100.0, np.ptp(energy) / np.max(history["hub_kinetic"])])
     assert np.max(lost[1]) < 1e-4
     assert np.log2(np.array(lost[0]) / lost[1]) == pytest.approx([2.0, 2.0], abs=0.3)
-
-
-def test_it_is_registered_and_has_fixed_steps() -> None:
-    """It is a scheme like any other, but that it does not estimate its error."""
-    assert "energy_conserving" in registry.schemes.names
-    with pytest.raises(ValueError, match="does not estimate its error, so its steps are fixed"):
-        released("reissner", 10).replace({"time.tolerance": 1e-3, "time.step": None})

@@ -11,7 +11,7 @@ import pytest
 import ufl
 
 import rotfem
-from rotfem.accuracy.explain import HISTORY, MODES, NOTICEABLE, RESOLVED
+from rotfem.commands.explain import HISTORY, MODES, NOTICEABLE, RESOLVED
 from rotfem.commands.printed import report
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system

@@ -74,13 +74,6 @@ def test_theory(extension: Callable[[str], ModuleType]) -> None:
     assert 0.0 < np.max(np.abs(own - other)) <= (size / 10.0) ** 2 * size
 
 
-def test_theory_takes_its_place_in_the_ladder(extension: Callable[[str], ModuleType]) -> None:
-    extension("half_square_theory")
-    rows = rotfem.explain(beam({"time.end": 0.4})).rows
-    names = [row["name"] for row in rows if row["kind"] == "theory"]
-    assert names.index("half_square") == names.index("second_order") + 1
-
-
 def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str], ModuleType]) -> None:
     extension("half_square_theory")
     plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
@@ -231,14 +224,6 @@ def test_output_needs_a_name_of_its_own(extension: Callable[[str], ModuleType], 
     rotfem.register(rotfem.Output(name, form))
     with pytest.raises(SceneError, match="is the name of a column already"):
         rotfem.run(scene.replace({"output.quantities": [name]}))
-
-
-def test_names_that_a_call_cannot_take(extension: Callable[[str], ModuleType]) -> None:
-    form = extension("root_moment").form
-    with pytest.raises(SceneError, match="is the name of an output of the call, too"):
-        rotfem.run(beam({"output.quantities": ["root_moment"]}), outputs={"root_moment": form})
-    with pytest.raises(SceneError, match='terms = "internal": is the name of an effect already'):
-        rotfem.run(beam(), terms={"internal": lambda m, delta: 0})
 
 
 @pytest.mark.parametrize(

@@ -105,16 +105,6 @@ def test_modes_are_about_what_a_history_starts_with() -> None:
     np.testing.assert_allclose(diagram.frequencies[-1], found.frequencies, rtol=1e-8)
 
 
-def test_a_base_acceleration_over_time_is_frozen_at_the_start() -> None:
-    """Modes and steady states say so of one that changes, and not of one that does not."""
-    said = "motion.base_acceleration changes with time: taken as at t = 0"
-    for change, there in ((1.0, True), (0.0, False)):
-        table = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0 + change]]
-        held = scene({}, model={"theory": "linear"}, motion=SPIN | {"base_acceleration": table}) | {"time": None}
-        for verb in (rotfem.run, rotfem.modes):
-            assert (said in verb(held).summary.get("warnings", [])) is there
-
-
 def test_gravity_along_a_tilted_axis_does_not_turn() -> None:
     """Its direction is that of the axis to round-off, or to the digits that it is typed with."""
     section = {"EA": 1e6, "GA2": 1e5, "GA3": 1e5, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0}

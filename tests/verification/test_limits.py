@@ -13,8 +13,6 @@ from scipy.optimize import brentq
 
 from rotfem import Scene, run
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.march import March, Steps
-from rotfem.analysis.schemes import Newmark
 from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
@@ -235,31 +233,6 @@ def test_rotary_inertia_may_vanish(spin_up: Any, theory: str) -> None:
 
 
 # --- damping ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("damping", "theory"),
-    [
-        ({"kelvin_voigt": 0.02}, "linear"),
-        ({"rayleigh": [0.2, 0.0]}, "linear"),
-        ({"rayleigh": [0.2, 0.03], "kelvin_voigt": 0.01}, "linear"),
-        ({"rayleigh": [0.2, 0.03], "kelvin_voigt": 0.01}, "reissner"),
-    ],
-)
-def test_decay_of_the_first_mode(unit_beam: Any, damping: dict[str, Any], theory: str) -> None:
-    """x(t) = e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t) with 2ζω = a0 + (a1 + eta) ω², exact."""
-    scene = unit_beam({"structure.damping": damping, "model.theory": theory})
-    system = Problem.of(scene).system()
-    omega, mode = first_mode(system)
-    a0, a1 = damping.get("rayleigh", (0.0, 0.0))
-    rate = (a0 + (a1 + damping.get("kelvin_voigt", 0.0)) * omega**2) / 2
-    damped = np.sqrt(omega**2 - rate**2)
-    amplitude, h = 1e-4, 0.005
-    for state in March(system, Newmark(), Steps(4.0, h), Newton.of(scene.solver), amplitude * mode):
-        x = np.exp(-rate * state.t) * (np.cos(damped * state.t) + rate / damped * np.sin(damped * state.t))
-        # the trapezoidal rule is late by ω³h²t/12
-        assert system.structure.tip_values(state.q)[1] / amplitude == pytest.approx(x, abs=omega**3 * h**2 * 4.0 / 12)
-    assert np.exp(-rate * 4.0) < 0.7  # so there was decay to be seen
 
 
 # --- frames and forces that are the same ------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.commands.problem import Problem
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
 from tests.plate_mesh_files import grid, write_msh
@@ -263,19 +262,6 @@ def test_orthotropic_plate_is_an_isotropic_one_of_another_width() -> None:
     wider = {"type": "plate", "length": 1.0, "width": stretch, "thickness": h, "rho": RHO, "E": E, "nu": 0.0}
     wanted = transverse(Scene.from_dict(base | {"structure": wider}))
     np.testing.assert_allclose(found[:6], wanted[:6], rtol=1e-4)
-
-
-def test_point_mass_is_all_there() -> None:
-    """Translation of the whole plate: e·M e is its mass, with a point mass at no node more by just that."""
-    masses = []
-    for points in ([], [[0.37, 0.211, 5.0], [1.0, -0.5, 2.0]]):
-        system = Problem.of(square(0.01, structure__point_masses=points)).system()
-        system.set_time(0.0)
-        x, y = system.A.createVecs()
-        x.array[2::5] = 1.0
-        system.matrix(0, 0, 1, 0.0).mult(x, y)
-        masses.append(y.dot(x))
-    assert masses[1] - masses[0] == pytest.approx(7.0, rel=1e-12)
 
 
 def test_point_mass_beside_the_plate() -> None:
