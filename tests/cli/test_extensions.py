@@ -50,13 +50,23 @@ def _own_registries() -> Iterator[None]:
             kind.remove(name)
 
 
-def summary(rotfem: Rotfem, file: str, verb: str, *changes: str, scene: str = "beam.toml", folder: str = "out") -> Any:
+BY = ("--load", "extensions.load")
+
+
+def summary(
+    rotfem: Rotfem, by: str, file: str, verb: str, *changes: str, scene: str = "beam.toml", folder: str = "out"
+) -> dict[str, Any]:
     """Return the summary of a command with a file of demos/extensions loaded and some keys changed."""
     options = [word for change in changes for word in ("--set", change)]
-    load = ("--load", str(FILES / f"{file}.py"))
-    done = rotfem(*load, verb, scene, *options, "--json", "--no-plots", "-o", folder)
+    path, before = str(FILES / f"{file}.py"), ["--load", str(FILES / f"{file}.py")]
+    if by != "--load":
+        text = Path(scene).read_text().split("[extensions]")[0]
+        Path(scene).write_text(text + f'[extensions]\nload = ["{path}"]\n')
+        before = []
+    done = rotfem(*before, verb, scene, *options, "--json", "--no-plots", "-o", folder)
     assert done.status == 0, done.err
-    return json.loads(done.out)
+    found: dict[str, Any] = json.loads(done.out)
+    return found
 
 
 def column(name: str, folder: str = "out") -> list[float]:
@@ -74,78 +84,18 @@ def at_rest(path: Path) -> None:
     path.write_text(SCENE.replace("duration = 2.0\n", "").split("[time]")[0])
 
 
-<<<<<<< HEAD
-def test_theory(rotfem: Rotfem) -> None:
-    """½ u₂'² against the stretch: they differ by the square of the deflection over L, and only for what bends."""
-    changes = ("time.end=1.0", "motion.speed=2.0")
-    assert summary(rotfem, "half_square_theory", "run", "model.theory=half_square", *changes)["theory"]
-    summary(rotfem, "half_square_theory", "run", "model.theory=von_karman", *changes, folder="other")
-    own, other = column("tip_u2")[-1], column("tip_u2", "other")[-1]
-    assert 0.0 < abs(own / other - 1) < (other / 10.0) ** 2
-
-
-def test_effect(rotfem: Rotfem) -> None:
-    """At rest the first mode of ρ ẍ + c ẋ + … has λ = −c/2ρ + iω."""
-    at_rest(Path("beam.toml"))
-    found = summary(rotfem, "linear_drag", "modes", *STILL, "structure.section.rotary_inertia=0")
-    assert found["modes"][0]["growth"] == pytest.approx(-0.05 / 2 / 1.2, rel=1e-9)
-
-
-def test_scheme(rotfem: Rotfem) -> None:
-    """A scheme of second order and Newmark's agree to the square of the step."""
-    summary(rotfem, "bdf2", "run", "time.scheme=bdf2", "time.end=0.5", "time.step=0.005")
-    summary(rotfem, "bdf2", "run", "time.scheme=newmark", "time.end=0.5", "time.step=0.005", folder="other")
-    assert column("tip_u2")[-1] == pytest.approx(column("tip_u2", "other")[-1], rel=2e-3)
-    assert column("tip_u2")[-1] != column("tip_u2", "other")[-1]
-
-
-@pytest.mark.parametrize(
-    ("shape", "dimensions", "centre", "area"),
-    [
-        ("ellipse", "semi_axis_2 = 0.02\nsemi_axis_3 = 0.01\n", 0.0, pi * 2e-4),
-        ("channel", "web = 0.2\nflange = 0.1\nthickness = 0.01\n", 0.01 / 0.4, 4e-3),
-    ],
-)
-def test_section(rotfem: Rotfem, shape: str, dimensions: str, centre: float, area: float) -> None:
-=======
 def test_section(rotfem: Rotfem) -> None:
->>>>>>> main
     """Mass and centre of mass: ρ A L; the centroid of a channel is off the line that the web stands on."""
     shape, dimensions = "channel", "web = 0.2\nflange = 0.1\nthickness = 0.01\n"
     head, tail = SCENE.replace("planar_beam", "spatial_beam").split("EA =")[0], SCENE[SCENE.index("[motion]") :]
     Path("beam.toml").write_text(f'{head}E = 7e10\nnu = 0.3\nrho = 2700.0\nshape = "{shape}"\n{dimensions}{tail}')
-<<<<<<< HEAD
-    found = summary(rotfem, shape, "check")
-    assert found["mass"] == pytest.approx(2700 * area * 10)
-    assert found["center_of_mass"] == pytest.approx([5.0, centre, 0.0], abs=1e-12)
-
-
-def test_shear_centre_of_a_section(rotfem: Rotfem) -> None:
-    """A force across at the web of a channel twists it by F e L/GJ, e = 3 b²/(6 b + h) away from the shear centre."""
-    at_rest(Path("beam.toml"))
-    text = Path("beam.toml").read_text().replace("planar_beam", "spatial_beam")
-    head, tail = text.split("EA =")[0], text[text.index("[motion]") :]
-    section = 'E = 7e10\nnu = 0.25\nrho = 2700.0\nshape = "channel"\nweb = 0.2\nflange = 0.1\nthickness = 0.01\n'
-    Path("beam.toml").write_text(head + section + tail)
-    summary(rotfem, "channel", "run", *STILL, "model.theory=linear", "loads.tip_force=[0, 0, 10]")
-    GJ = 7e10 / 2.5 * 0.4 * 0.01**3 / 3
-    assert column("tip_theta1")[0] == pytest.approx(10 * 3 * 0.1**2 / (6 * 0.1 + 0.2) * 10.0 / GJ, rel=1e-9)
-
-
-def test_output(rotfem: Rotfem) -> None:
-    """EI α' at the clamp under a force F across the tip is F L."""
-    at_rest(Path("beam.toml"))
-    keys = ("output.quantities=['root_moment']", "model.theory=linear", "loads.tip_force=[0, 100]")
-    summary(rotfem, "root_moment", "run", *STILL, *keys)
-    assert column("root_moment") == pytest.approx([1000.0], rel=1e-6)
-=======
     found = summary(rotfem, "--load", shape, "check")
     assert found["mass"] == pytest.approx(2700 * 4e-3 * 10)
     assert found["center_of_mass"] == pytest.approx([5.0, 0.01 / 0.4, 0.0], abs=1e-12)
->>>>>>> main
 
 
-def test_importer(rotfem: Rotfem, folder: Path) -> None:
+@pytest.mark.parametrize("by", BY)
+def test_importer(rotfem: Rotfem, folder: Path, by: str) -> None:
     """The mass of a blade that tapers; `import` writes a scene, `section.from` reads the file where it is."""
     rows = [
         "# x, EA, GA, GJ, EI flap, EI lag, mass",
@@ -153,15 +103,20 @@ def test_importer(rotfem: Rotfem, folder: Path) -> None:
         "8, 1e7, 5e6, 5e2, 5e3, 1e4, 0.6",
     ]
     (folder / "blade.csv").write_text("\n".join(rows))
-    done = rotfem("--load", str(FILES / "blade_csv.py"), "import", "blade.csv", "-o", "blade.toml")
-    assert done.status == 0, done.err
-    assert summary(rotfem, "blade_csv", "check", scene="blade.toml")["mass"] == pytest.approx(0.9 * 8)
+    if by == "--load":
+        done = rotfem("--load", str(FILES / "blade_csv.py"), "import", "blade.csv", "-o", "blade.toml")
+        assert done.status == 0, done.err
+    else:
+        text = '[structure]\ntype = "spatial_beam"\n[structure.section]\nfrom = "blade.csv"\n'
+        (folder / "blade.toml").write_text(text + '[motion]\ntype = "constant"\nspeed = 0.0\n')
+    assert summary(rotfem, by, "blade_csv", "check", scene="blade.toml")["mass"] == pytest.approx(0.9 * 8)
 
 
-def test_motion_law(rotfem: Rotfem, folder: Path) -> None:
+@pytest.mark.parametrize("by", BY)
+def test_motion_law(rotfem: Rotfem, folder: Path, by: str) -> None:
     text = SCENE.split("[motion]")[0] + '[motion]\ntype = "wobble"\nmean = 2.0\namplitude = 0.5\n[mesh]\nelements = 2\n'
     (folder / "law.toml").write_text(text + "[time]\nend = 0.1\nstep = 0.05\n")
-    summary(rotfem, "wobble", "run", scene="law.toml")
+    summary(rotfem, by, "wobble", "run", scene="law.toml")
     assert column("psi_dot")[-1] == pytest.approx(2.0 + 0.5 * sin(2 * pi * 0.1), rel=1e-12)
     refused = rotfem("run", "law.toml", "--set", "motion.frequency=-1")
     assert (refused.status, "motion.frequency = -1" in refused.err) == (2, True)
@@ -169,22 +124,12 @@ def test_motion_law(rotfem: Rotfem, folder: Path) -> None:
     assert (refused.status, 'did you mean "amplitude"?' in refused.err) == (2, True)
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
-def test_damping(rotfem: Rotfem, theory: str) -> None:
-    """ζ = ηω/2 of modes that bend, but for shear, and 0 of those that stretch, in linear and nonlinear theories."""
-    at_rest(Path("beam.toml"))
-    eta = 1e-3
-    keys = (f"model.theory={theory}", f"structure.damping.bending_damping={eta}", "modes.count=8")
-    found = summary(rotfem, "bending_damping", "modes", *STILL, *keys)
-=======
 def test_damping(rotfem: Rotfem) -> None:
     """ζ = ηω/2 of modes that bend, but for shear, and 0 of those that stretch, in linear and nonlinear theories."""
     at_rest(Path("beam.toml"))
     eta = 1e-3
     keys = ("model.theory=consistent_linear", f"structure.damping.bending_damping={eta}", "modes.count=8")
     found = summary(rotfem, "--load", "bending_damping", "modes", *STILL, *keys)
->>>>>>> main
     for row in found["modes"]:
         expected = eta * row["frequency"] / 2 * (row["share_lag"] > 0.5)
         assert row["damping"] == pytest.approx(expected, rel=0.04, abs=1e-9)
@@ -195,13 +140,8 @@ def test_design(rotfem: Rotfem, folder: Path) -> None:
     """A propeller is a spatial beam of the diameter; its parameters are keys that --set changes."""
     text = '[structure]\ntype = "propeller"\ndiameter = 0.2\npitch = 0.1\nE = 6e10\nrho = 1600.0\n'
     (folder / "prop.toml").write_text(text + '[motion]\ntype = "constant"\nspeed = 0.0\n')
-<<<<<<< HEAD
-    assert summary(rotfem, "propeller", "check", scene="prop.toml")["length"] == pytest.approx(0.085)
-    found = summary(rotfem, "propeller", "check", "structure.diameter=0.4", scene="prop.toml")
-=======
     assert summary(rotfem, "--load", "propeller", "check", scene="prop.toml")["length"] == pytest.approx(0.085)
     found = summary(rotfem, "--load", "propeller", "check", "structure.diameter=0.4", scene="prop.toml")
->>>>>>> main
     assert found["length"] == pytest.approx(0.17)
     refused = rotfem("check", "prop.toml", "--set", "structure.diametr=1")
     assert (refused.status, 'did you mean "diameter"?' in refused.err) == (2, True)
@@ -230,7 +170,7 @@ def test_scene_loads_a_file_beside_it(rotfem: Rotfem, folder: Path) -> None:
         ("import rotfem\nrotfem.register(rotfem.Effect('gravity'))\n", "failed: line 2: ValueError: 'gravity' is the"),
     ],
 )
-@pytest.mark.parametrize("by", ["--load", "extensions.load"])
+@pytest.mark.parametrize("by", BY)
 def test_files_that_fail(rotfem: Rotfem, folder: Path, by: str, content: str | None, message: str) -> None:
     """One line, exit status 2, nothing written, and nothing stays registered."""
     if content is not None:
