@@ -211,9 +211,8 @@ def _counts_for(aspect: float) -> tuple[int, int]:
 
 def estimates_error(scheme: type) -> bool:
     """Return whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
-    base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
-    own: Any = scheme
-    return own.local_error is not base.local_error
+    owner = next(base for base in scheme.__mro__ if "local_error" in base.__dict__)
+    return "registry" not in owner.__dict__
 
 
 def usual(given: Mapping[str, Any]) -> str:
