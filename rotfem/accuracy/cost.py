@@ -1,6 +1,6 @@
 """What accuracy costs: the ladder of each theory and each scheme, measured against the last rung of the richest theory.
 
-The reference is known to the error of that rung (`rotfem.accuracy.refine.reduced`). A row that is nearer to the
+The reference is known to the error of that rung (`rotfem.accuracy.ladder.reduced`). A row that is nearer to the
 reference than the reference is known has that as its error, and is no better than others of which the same is true.
 """
 
@@ -16,8 +16,7 @@ import numpy as np
 
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
 from rotfem.accuracy.errors import percent
-from rotfem.accuracy.ladder import ladder
-from rotfem.accuracy.refine import MOST_FAILURES, Clock, OverBudget, reduced
+from rotfem.accuracy.ladder import MOST_FAILURES, Clock, OverBudget, ladder, reduced
 from rotfem.accuracy.tuned import write_variant
 from rotfem.errors import ComputationError, InputError
 from rotfem.results.columns import ShortTable, per_cent
@@ -118,7 +117,7 @@ class Study:
         """Measure the rungs of one ladder; the first one that has answers gives the reference."""
         is_first = self.reference is None
         before: Answer | None = None
-        apart, error, stuck, failures = math.inf, math.inf, 0, 0
+        error, stuck, failures = math.inf, 0, 0
         for setting in ladder(self.scene, theory, scheme, self.moving):
             predicted = None if before is None else 2.0 * before.seconds
             if predicted is not None and predicted > DEARER * self._enough():
@@ -134,9 +133,7 @@ class Study:
             answer = found.answer
             if is_first:
                 if before is not None:
-                    there, ratio = distance(answer, before).size, 6.0
-                    known = reduced(there, apart, ratio)
-                    apart, self.known = there, math.inf if known is None else known
+                    self.known = reduced(distance(answer, before).size, self.known, 6.0)
                 self.reference, before = answer, answer
                 if self.known <= AIM * self.accuracy:
                     return

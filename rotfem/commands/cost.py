@@ -14,7 +14,7 @@ from mpi4py import MPI
 from rotfem import registry
 from rotfem.accuracy.answer import Answers
 from rotfem.accuracy.cost import ERRORS, CostResult, Study, recommendations
-from rotfem.accuracy.refine import Clock
+from rotfem.accuracy.ladder import Clock
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.answers import in_own_setting
 from rotfem.commands.interrupts import together
