@@ -191,7 +191,7 @@ class Model:
         """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
 
         Args:
-            purpose: what beside the residual they depend on.
+            purpose: what they depend on in addition to the residual.
             make: name ↦ UFL form.
             more: constants and functions in them that are not in the residual.
             once: see `rotfem.numerics.forms.form`.
