@@ -213,12 +213,6 @@ class Model:
                 del _KNOWN[next(iter(_KNOWN))]
         return {name: forms.constants_of(f) for name, f in derived.items()}, compiled
 
-    def by_strains(self) -> list[Any]:
-        """Return the residual in two parts, the first with all terms that have strains; UFL forms."""
-        within = [term for name, term in self.terms.items() if self.acting[name].internal]
-        rest = [term for name, term in self.terms.items() if not self.acting[name].internal]
-        return [added(part) for part in (within, rest) if part]
-
     @cached_property
     def turn(self) -> RigidTurn:
         """A rigid turn about the axis of the motion."""
