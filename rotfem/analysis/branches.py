@@ -42,9 +42,9 @@ SURE, AMBIGUOUS = 0.9, 0.5
 #: most of its steps: a veering takes 34.
 FINEST, MOST_STEPS = 1e-5, 200
 
-#: Relative error of zeros of a model; of those that only say where to solve, in parts of the distance of two speeds,
-#: and steps from there on after which the next would be below round-off; solutions for one zero, usually one.
-ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 1e-5, 5
+#: Relative error of zeros of a model; in parts of the distance of two speeds, the error of those that only say where to
+#: solve, and the last step of Newton's method: its error is about the square, 1e-7. Solutions for a zero, usually one.
+ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
@@ -172,7 +172,7 @@ class BranchPath:
     Args:
         left: the first speed, its branches known.
         right: the other one.
-        model: makes the model between them; called only where it is needed.
+        model: makes the model of some solved modes, by speed; called only where it is needed.
         count: number of branches that matter.
 
     Attributes:
@@ -181,8 +181,11 @@ class BranchPath:
         hidden: a speed between, where a mode is unstable in another way than at both ends; None without.
     """
 
-    def __init__(self, left: SpeedPoint, right: SpeedPoint, model: Callable[[], SpeedModel], count: int):
+    def __init__(
+        self, left: SpeedPoint, right: SpeedPoint, model: Callable[[Sequence[Spinning]], SpeedModel], count: int
+    ):
         self.left, self.right, self.count, self._make = left, right, count, model
+        self._solved = [left.spinning, right.spinning]
         self.points = [left, right]
         self.weak = dict[int, float]()
         self.hidden: float | None = None
@@ -193,7 +196,13 @@ class BranchPath:
     @cached_property
     def model(self) -> SpeedModel:
         """Model of the modes between the two speeds."""
-        return self._make()
+        return self._make(self._solved)
+
+    def take(self, spinning: Spinning) -> SpeedPoint:
+        """Make modes that are solved between the two speeds part of the model; return them joined with the branches."""
+        self._solved = sorted([*self._solved, spinning], key=lambda s: s.speed)
+        self.model = self._make(self._solved)
+        return self.joined(spinning)
 
     def inside(self, point: SpeedPoint) -> SpeedPoint:
         """Return a point as the model has it."""
@@ -315,7 +324,7 @@ class Sweep:
     def _advance(self, target: SpeedPoint) -> None:
         """Append a point, and one before it where the model between cannot tell the branches."""
         last = self.points[-1]
-        path = BranchPath(last, target, lambda: self._model(last.spinning, target.spinning), self.count)
+        path = BranchPath(last, target, self._model, self.count)
         if self._room and (path.hidden is not None or path.weak):
             self._insert(path.hidden or 0.5 * (last.speed + target.speed))
             self._advance(target)
@@ -326,13 +335,12 @@ class Sweep:
         self.points.append(target)
         self.paths.append(path)
 
-    def _model(self, left: Spinning, right: Spinning) -> SpeedModel:
-        """Return the model between two speeds, which knows the points beside them, too."""
+    def _model(self, solved: Sequence[Spinning]) -> SpeedModel:
+        """Return the model between some speeds, which knows the points beside them, too."""
         if self.model is not None:
             return self.model
-        points = [p.spinning for p in self.points]
-        beside = [s for s in points if s.speed < left.speed][-1:] + [s for s in points if s.speed > right.speed][:1]
-        return between((left, right), beside)
+        points, low, high = [p.spinning for p in self.points], solved[0].speed, solved[-1].speed
+        return between(solved, [s for s in points if s.speed < low][-1:] + [s for s in points if s.speed > high][:1])
 
     # --- what the diagram says ----------------------------------------------------------------------------------------
 
@@ -413,7 +421,7 @@ class Sweep:
         """Return where a branch meets kΩ, from the speed at which the model does: Newton's method."""
         for _ in range(SOLUTIONS):
             try:
-                point = path.joined(self.solve(speed, path.left.spinning, False).spinning)
+                point = path.take(self.solve(speed, path.left.spinning, False).spinning)
             except ComputationError:  # K is singular: this is the speed
                 return speed
             pairs, j, gap = point.spinning.pairs, point.order[b], self._gap(point, b, k)
@@ -457,29 +465,30 @@ class Sweep:
 
         Where growth begins or ends, round-off of a λ near zero may call it static or dynamic.
         """
-        low, high, model, speed = path.left.spinning, path.right.spinning, path.model, np.inf
-        count, least = len(low.pairs.values), 1e-9 * (high.speed - low.speed)  # a model has more modes
+        low, high, speed = path.left.speed, path.right.speed, np.inf
+        count, least = len(path.left.spinning.pairs.values), 1e-9 * (high - low)  # a model has more modes
 
         def same(s: Spinning) -> bool:
             kind = unstable(s.first(count))
             return kind == before if before and after else (kind is None) == (before is None)
 
         for _ in range(SOLUTIONS):
-            last, a, b = speed, low.speed, high.speed
+            last, a, b = speed, low, high
             while b - a > least:
                 middle = 0.5 * (a + b)
-                a, b = (middle, b) if same(model.modes(middle)) else (a, middle)
+                a, b = (middle, b) if same(path.model.modes(middle)) else (a, middle)
             speed = b
             if self.final or abs(speed - last) <= 1e-6 * abs(speed):
                 break
             try:
-                solved = self.solve(speed, low, False).spinning
+                solved = self.solve(speed, path.left.spinning, False).spinning
             except ComputationError:  # K is singular: this is the speed
                 break
-            low, high = (solved, high) if same(solved) else (low, solved)
-            model = self._model(low, high)
-        grows = max((lam.real for lam, _ in growing(model.modes(a, count))), default=0.0)
-        return None if after is None and grows > 1e-2 * np.median(np.abs(low.pairs.values)) else speed
+            path.take(solved)
+            low, high = (speed, high) if same(solved) else (low, speed)
+        grows = max((lam.real for lam, _ in growing(path.model.modes(a, count))), default=0.0)
+        typical = np.median(np.abs(path.left.spinning.pairs.values))
+        return None if after is None and grows > 1e-2 * typical else speed
 
 
 def growing(spinning: Spinning) -> list[tuple[complex, str]]:

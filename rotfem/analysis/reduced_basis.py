@@ -182,7 +182,7 @@ class SpeedModel:
         """Return modes with their vectors in the basis."""
         if s.lift is self.lift or self._dual is None:
             return s
-        right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.pairs.right, s.pairs.left))
+        right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.right, s.lifted(s.pairs.left)))
         pairs, pencil = replace(s.pairs, right=right, left=left), self._pencil(s.speed)
         return Spinning(s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
 
@@ -194,21 +194,21 @@ class SpeedModel:
         return complex(-(y.conj() @ (lam**2 * M + lam * C + K) @ x) / s.own[j, j])
 
 
-def between(both: tuple[Spinning, Spinning], beside: Sequence[Spinning]) -> SpeedModel:
+def between(solved: Sequence[Spinning], beside: Sequence[Spinning]) -> SpeedModel:
     """Return the model between two speeds that are solved; it has their modes, but for round-off in K.
 
     Args:
-        both: modes at the two speeds.
+        solved: modes at both speeds and at those solved between, by speed.
         beside: modes at speeds beside them, of which those of the same sign are nodes too.
     """
-    pencil, (low, high) = both[0].pencil, (s.speed for s in both)
+    pencil, low, high = solved[0].pencil, solved[0].speed, solved[-1].speed
     scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
     # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
-    further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in both]
-    vectors = np.hstack([*(s.pairs.right for s in both), *further]) / scale
+    further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in solved]
+    vectors = np.hstack([*(s.pairs.right for s in solved), *further]) / scale
     inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
-    nodes = {s.speed: s.pencil for s in (*both, *beside) if s.speed * (low + high) >= 0.0}
-    count = max(len(s.pairs.values) for s in both)
+    nodes = {s.speed: s.pencil for s in (*solved, *beside) if s.speed * (low + high) >= 0.0}
+    count = max(len(s.pairs.values) for s in solved)
     return SpeedModel(scale * inner, nodes.items(), low * high >= 0.0, count, inner / scale)
 
 

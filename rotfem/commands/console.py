@@ -189,8 +189,8 @@ class Session:
         if self.report and last:
             further = [*further, self._page(result)]
         self.bar.describe("writing results and figures")
-        write, again = self.results, self._shown
-        problems = write.add(result, further) if again else write.write(result, self.plots, further)
+        again = self._shown
+        problems = result.write_into(self.results, self.plots, further, again)
         self._shown = not last
         self.bar.stop()
         if last:

@@ -23,7 +23,8 @@ from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import computing
 from rotfem.mechanics.theories import Theory, richest, theories
-from rotfem.results.run import RunResult, StationHistory, Table
+from rotfem.results.files import Table
+from rotfem.results.run import RunResult, StationHistory
 from rotfem.scene.settings import OutputTable
 from rotfem.units import speed_text
 
@@ -276,7 +277,7 @@ class Recorder:
             self.system.count_rotations_from(self._last.reference)
             self.system.set_time(self._last.t)
             self.system.set_state(self._last.q, self._last.v, self._last.a)
-        shape = self.system.shape() if len(self.history) else {}
+        shape = self.system.shape() if self.history.rows else {}
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()

@@ -352,9 +352,9 @@ def run(
             done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
             if error.result is not None:
-                results.write(error.result, plots=False)
+                error.result.write_into(results)
             raise
-        problems = results.write(done, plots=False)
+        problems = done.write_into(results)
         if problems:
             raise problems[0]
         return done

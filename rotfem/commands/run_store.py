@@ -3,16 +3,23 @@
 A checkpoint holds the state (t, q, v, a and the memory of the scheme), the rows so far, and what observers and the
 march remember. Of a shared mesh it has the arrays of every process. Factors and matrices are made anew, so that a run
 that goes on agrees with an unbroken one up to the tolerance of its iterations.
+
+Its file is an npz: arrays, and JSON that refers to them. A dataclass is stored by its name and those of its fields.
+Nothing in the file is executed.
 """
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
 from functools import reduce
+from importlib import import_module
 from pathlib import Path
 from time import monotonic, perf_counter
 from typing import Any
@@ -25,17 +32,20 @@ from rotfem.analysis.schemes import State
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.recorder import Log, Monitor, Recorder
 from rotfem.equations.system import System
-from rotfem.errors import SceneError, Stopped
+from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import computing
-from rotfem.results.checkpoint_file import checkpoint_of, read_checkpoint, write_checkpoint
-from rotfem.results.result_set import CHECKPOINT, LiveTable, ResultFolder
+from rotfem.results.files import write_whole
+from rotfem.results.result_set import CHECKPOINT, ResultFolder
 from rotfem.scene import Scene, Time
-from rotfem.version import versions
+from rotfem.version import __version__
 
 Tree = dict[str, Any]
 
 #: Steps between two talks of ranks that each compute all of a small system: some 50 ms.
 SELDOM = 50
+
+#: Keys that stand in the JSON for an array, and for a dataclass.
+ARRAY, CLASS = "#array", "#class"
 
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
@@ -68,7 +78,7 @@ class Memory:
         found = {name: reduce(lambda x, key: x and getattr(x, key), name.split("."), self) for name in REMEMBERED}
         return {name: part for name, part in found.items() if part is not None}
 
-    def taken(self, state: State, identity: Tree) -> Tree:
+    def taken(self, state: State) -> Tree:
         """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
         own = {
             "positions": self.system.V.tabulate_dof_coordinates(),
@@ -78,12 +88,10 @@ class Memory:
             },
         }
         return {
-            "identity": identity,
-            "versions": versions(),
             "t": state.t,
             "elapsed": self.log.elapsed + perf_counter() - self.log.started,
             "cpu": self.log.cpu + computing() - self.log.began,
-            "rows": np.array(self.record.history.rows()).reshape(len(self.record.history), -1),
+            "rows": np.array(self.record.history.rows),
             "processes": self.system.comm.gather(own),
         }
 
@@ -92,12 +100,12 @@ class Memory:
         comm, here, ranks = self.system.comm, self.system.V.tabulate_dof_coordinates(), len(tree["processes"])
         if ranks != comm.size:
             why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
-            raise SceneError("command line", "--resume", path, why)
+            raise refused(path, why)
         own = tree["processes"][comm.rank]
         there, near = own["positions"], 1e-9 * float(np.max(np.ptp(here, axis=0)))
         same = there.shape == here.shape and bool(np.max(np.abs(there - here)) <= near)
         if not comm.allreduce(same, MPI.LAND):
-            raise SceneError("command line", "--resume", path, "is of another mesh")
+            raise refused(path, "is of another mesh")
         for name, part in self.parts().items():
             vars(part).update(own["parts"][name])
         for row in tree["rows"]:
@@ -110,6 +118,76 @@ class Memory:
         return state
 
 
+# --- the file ---------------------------------------------------------------------------------------------------------
+
+
+def refused(value: object, why: str) -> SceneError:
+    """Return the error of what --resume cannot go on from."""
+    return SceneError("command line", "--resume", value, why)
+
+
+@contextmanager
+def checkpoint_of(path: Path) -> Iterator[None]:
+    """Say in one error that a file is not a checkpoint of this program."""
+    try:
+        yield
+    except SceneError:
+        raise
+    except Exception as error:  # of any kind, as anything may lie anywhere
+        why = f"is damaged, or no checkpoint of this rotfem ({type(error).__name__}); start the run without --resume"
+        raise refused(path, why) from None
+
+
+def write_checkpoint(path: Path, tree: Tree) -> None:
+    """Write a tree of dicts, lists, dataclasses, arrays, numbers and texts, whole or not at all."""
+    arrays = list[Any]()
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
+            arrays.append(value)
+            return {ARRAY: f"arr_{len(arrays) - 1}"}
+        if is_dataclass(value):
+            own = {field.name: getattr(value, field.name) for field in fields(value) if field.init}
+            return {CLASS: f"{type(value).__module__}:{type(value).__qualname__}", **own}
+        if isinstance(value, np.generic) and value.dtype.kind in "biuf":
+            return value.item()
+        raise ComputationError(f"a checkpoint cannot hold a {type(value).__qualname__}")
+
+    head = json.dumps({"rotfem": __version__, **tree}, default=plain).encode()
+    image = io.BytesIO()
+    np.savez(image, *arrays, head=np.frombuffer(head, dtype=np.uint8))
+    with image.getbuffer() as content:
+        write_whole(path, content)
+
+
+def read_checkpoint(path: Path) -> Tree:
+    """Return the tree of a checkpoint file; tuples have become lists."""
+    if not path.exists():
+        raise refused(path, "there is no checkpoint; start the run with --checkpoint, and without --resume")
+    with checkpoint_of(path), np.load(path, allow_pickle=False) as file:
+        head = file["head"].tobytes()
+        if (there := json.loads(head)["rotfem"]) != __version__:
+            why = f"was written by rotfem {there}, this is {__version__}; start the run anew, without --resume"
+            raise refused(path, why)
+
+        def full(entries: Tree) -> Any:
+            if CLASS in entries:
+                return dataclass_of(entries.pop(CLASS))(**entries)
+            return file[entries[ARRAY]] if ARRAY in entries else entries
+
+        tree: Tree = json.loads(head, object_hook=full)
+    return tree
+
+
+def dataclass_of(name: str) -> Any:
+    """Return a dataclass of the program, or of a file that it has loaded, by "module:name"; nothing else is called."""
+    module, _, attribute = name.partition(":")
+    found = getattr(import_module(module) if module.startswith("rotfem.") else sys.modules.get(module), attribute, None)
+    if not (isinstance(found, type) and is_dataclass(found)):
+        raise refused(name, "is no dataclass of rotfem or of what --load has read")
+    return found
+
+
 # --- of which run -----------------------------------------------------------------------------------------------------
 
 
@@ -120,32 +198,24 @@ def identity_of(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, An
     tables: Tree = json.loads(json.dumps(scene.digest(), default=str))
     tables.get("time", {}).pop("end", None)
     tables.pop("name", None)
-    return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
+    return {**tables, "content of the mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
 
 
 def differences(there: Any, here: Any, key: str = "") -> list[str]:
     """Return which keys of two identities differ, and how."""
     if isinstance(there, dict) and isinstance(here, dict):
-        keys = list(dict.fromkeys([*there, *here]))
-        return [line for k in keys for line in differences(there.get(k), here.get(k), f"{key}.{k}" if key else k)]
-    if there == here:
-        return []
+        keys = dict.fromkeys([*there, *here])
+        return [line for k in keys for line in differences(there.get(k), here.get(k), f"{key}.{k}".strip("."))]
     shown = [value if len(value) <= 40 else value[:39] + "…" for value in map(json.dumps, (there, here))]
-    return [f"{key.removeprefix('scene.')} is {shown[0]} there and {shown[1]} here"]
+    return [] if there == here else [f"{key} is {shown[0]} there and {shown[1]} here"]
 
 
 def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
     """Refuse a checkpoint of another run, or one that lies after an end (s)."""
-    why, (there, here) = "", (tree["versions"]["rotfem"], versions()["rotfem"])
-    if there != here:
-        why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
-    elif lines := differences(tree["identity"], mine):
-        more = f", and {len(lines) - 4} more" if len(lines) > 4 else ""
-        why = f"is of another run: {'; '.join(lines[:4])}{more}"
-    elif end < tree["t"]:
-        why = f"is of t = {tree['t']:g} s, after time.end = {end:g} s"
-    if why:
-        raise SceneError("command line", "--resume", path, why)
+    if lines := differences(tree["identity"], mine):
+        raise refused(path, f"is of another run: {'; '.join(lines[:4])}")
+    if end < tree["t"]:
+        raise refused(path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
 
 # --- when it is written -----------------------------------------------------------------------------------------------
@@ -178,7 +248,6 @@ class RunStore:
         resume: bool = False,
     ):
         self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
-        self._live: LiveTable | None = None
         self._run: Memory | None = None
         self._tree: Tree | None = None
         self._identity: Tree = {}
@@ -228,15 +297,14 @@ class RunStore:
                 state = run.put_back(folder.path / CHECKPOINT, tree)
         self._tree = None  # of this run alone, not of a finer one after it
         folder.begin((CHECKPOINT,) if tree is not None else ())
-        self._live = folder.grow("history.csv", run.record.history)
+        folder.grow("history.csv", run.record.history)
         self._written = monotonic()
         return state
 
     def stepped(self, state: State) -> None:
         """Take note of the end of a step; raise `Stopped` where a signal has asked one of the ranks to end."""
         assert self._run is not None
-        if self._live is not None:
-            self._live.update()
+        self._run.record.history.flush(1.0)
         (asked, due), time = self._agreed(self._run), self._run.time
         left = (time.end - state.t) / (time.step or 1e-9 * time.end)  # steps at least; of adaptive ones if there is one
         # The last state that a run with a later end would have met, too, is kept; none after it.
@@ -244,7 +312,7 @@ class RunStore:
             self._save(state)
         if asked:
             if self.folder is not None:  # at once: mpirun gives its processes a quarter of a second to end
-                self.folder.first_does(self._secure)
+                self.folder.first_does(self.folder.stop)
             raise Stopped
 
     def _agreed(self, run: Memory) -> tuple[bool, bool]:
@@ -262,18 +330,11 @@ class RunStore:
             asked, late = any(rank[0] for rank in told), told[0][1]
         return asked, due or late
 
-    def _secure(self) -> None:
-        """Put the rows so far on disk, and say that the run was interrupted."""
-        assert self.folder is not None
-        if self._live is not None:
-            self._live.flush()
-        self.folder.summarise({**self.folder.summary, "status": "interrupted"})
-
     def _save(self, state: State) -> None:
         """Write a checkpoint."""
         folder = self.folder
         if folder is None or self._run is None or self.every is None:
             return
-        tree = self._run.taken(state, self._identity) | {"every": self.every}
+        tree = self._run.taken(state) | {"identity": self._identity, "every": self.every}
         folder.first_does(lambda: write_checkpoint(folder.path / CHECKPOINT, tree))
         self._written = monotonic()

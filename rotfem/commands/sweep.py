@@ -190,7 +190,8 @@ def sweep(
             if progress is not None:
                 progress(len(rows) / len(points))
         found: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
-        results.publish(found)
+        results.publish(found.texts())
+        results.summarise(found.summary)
         return found
 
 

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -60,17 +61,55 @@ def csv_text(columns: Mapping[str, npt.ArrayLike | Sequence[Any]]) -> str:
     return buffer.getvalue()
 
 
-def line(row: Iterable[float]) -> str:
-    """Return numbers as a line of CSV, with all their digits."""
-    return ",".join([repr(float(value)) for value in row]) + "\n"
-
-
 def read_csv(path: str | Path) -> dict[str, Array]:
     """Return the columns of a CSV file that `csv_text` made; a last line that was cut short is not read."""
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.reader(line for line in file if line.endswith("\n")))
     values = np.array(rows[1:], dtype=np.float64).reshape(len(rows) - 1, len(rows[0]))
     return {name: values[:, i].copy() for i, name in enumerate(rows[0])}
+
+
+class Table:
+    """Columns of equal length that grow by rows; their names are in the order they are written.
+
+    Attributes:
+        columns: names.
+        rows: numbers, so far.
+    """
+
+    def __init__(self, columns: Iterable[str]):
+        self.columns, self.rows = tuple(columns), list[tuple[float, ...]]()
+        self._path: Path | None = None
+        self._written, self._when = 0, 0.0
+
+    def append(self, row: Iterable[float]) -> None:
+        """Add one row in the order of the columns."""
+        self.rows.append(tuple(map(float, row)))
+
+    def arrays(self) -> dict[str, Array]:
+        """Return name ↦ array of all values so far."""
+        values = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), len(self.columns))
+        return {name: values[:, i].copy() for i, name in enumerate(self.columns)}
+
+    def keep(self, path: Path) -> None:
+        """Write the table as a CSV file, to which `flush` adds rows."""
+        write_text(path, csv_text(self.arrays()))
+        self._path, self._written, self._when = path, len(self.rows), monotonic()
+
+    def flush(self, seconds: float = 0.0) -> None:
+        """Add the new rows to the file, if there is one and so much time has passed since that was done.
+
+        Where the disk is full nothing is added any more: all is written again at the end.
+        """
+        if self._path is None or monotonic() - self._when < seconds:
+            return
+        text = "".join(",".join(map(repr, row)) + "\n" for row in self.rows[self._written :])
+        try:
+            with open(self._path, "ab", buffering=0) as file:
+                file.write(text.encode())
+        except OSError:
+            self._path = None
+        self._written, self._when = len(self.rows), monotonic()
 
 
 def json_text(data: Any) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.errors import printable
+from rotfem.errors import OutputError, SceneError, printable
+from rotfem.listeners import ONE_PROCESS
 from rotfem.registry import resolved
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, Variables, dataset
 from rotfem.results.files import json_text, write_whole
+from rotfem.results.result_set import RUNNING, ResultFolder, Writer
 
 if TYPE_CHECKING:
     import pandas
@@ -132,11 +134,29 @@ class Result(ABC):
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the files into a folder, in the place of the results that are there; return their paths."""
-        from rotfem.listeners import ONE_PROCESS
-        from rotfem.results.result_set import ResultFolder
-
         with ResultFolder(ONE_PROCESS, Path(folder), self.summary.get("command", "")) as results:
-            return results.publish(self)
+            return [*results.publish(self.texts()), results.summarise(self.summary)]
+
+    def write_into(
+        self, results: ResultFolder, plots: bool = False, further: Sequence[Writer] = (), again: bool = False
+    ) -> list[OutputError | SceneError]:
+        """Write tables, then large files and figures, the summary last; return what went wrong with these.
+
+        Of a result whose tables are there already (`again`) it writes what else is wanted, and the summary.
+        """
+        if not again:
+            results.publish(self.texts())
+            results.summary = {**self.summary, "status": RUNNING}
+            writers = [*self.large(), *further, *([self.draw] if plots else [])]
+            problems = [results.attempt(write) for write in writers]
+            if (fields := getattr(self, "fields", None)) is not None:
+                problems.append(results.attempt(fields, self.summary.get("shared") == "mesh"))
+            lost = [f"not written: {problem}" for problem in problems if isinstance(problem, OutputError)]
+            self.summary["warnings"] = [*self.summary["warnings"], *lost]
+        else:
+            problems = [results.attempt(write) for write in further]
+        results.summarise(self.summary)
+        return [problem for problem in problems if problem is not None]
 
     def draw(self, folder: Path) -> list[Path]:
         """Write all figures into a folder; return their paths."""

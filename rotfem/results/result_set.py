@@ -12,25 +12,19 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import AbstractContextManager, suppress
-from math import inf
 from pathlib import Path
-from time import monotonic
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError
-from rotfem.results.files import PART, csv_text, json_text, line, read_csv, write_text, writing
+from rotfem.results.files import PART, Table, json_text, read_csv, write_text, writing
 from rotfem.version import __version__
-
-if TYPE_CHECKING:
-    from rotfem.results.result import Result
-    from rotfem.results.run import Table
 
 T = TypeVar("T")
 
 #: Writes files into a folder.
-Writer = Callable[[Path], Any]
+Writer = Callable[[Path], object]
 
 SUMMARY, CHECKPOINT = "summary.json", "checkpoint.npz"
 
@@ -69,7 +63,7 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
     def __init__(self, comm: Any, path: Path, command: str, inputs: Iterable[Path] = ()):
         self.comm, self.path, self.command = comm, path, command
         self.summary: dict[str, Any] = {}
-        self._live: LiveTable | None = None
+        self._growing: Table | None = None
         self.first_does(lambda: check_own(path, inputs))
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
@@ -77,14 +71,14 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
 
     def close(self, error: BaseException | None = None) -> None:
         """Say in the summary what ended the command where its results are not complete."""
-        if self._live is not None:
-            self._live.close()
         if self.comm.rank == 0 and self.summary.get("status") == RUNNING:
+            if self._growing is not None:
+                self._growing.flush()
             kind = "" if isinstance(error, ComputationError | InputError | OutputError) else f"{type(error).__name__}: "
             failure = {"what": " ".join(f"{kind}{error}".split()), "time": None, "advice": ""}
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "failed"
             with suppress(OutputError):  # as where the disk is full
-                self.summarise({"failure": failure, **self.summary, "status": status})
+                self._summarise({"failure": failure, **self.summary, "status": status})
 
     def first_does(self, work: Callable[[], T]) -> T:
         """Return on every rank what rank 0 makes of some work with the files, or raise its error."""
@@ -104,57 +98,38 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         if self.summary:
             return
         self.summary = {"command": self.command, "status": RUNNING, "warnings": []}
-        self.first_does(lambda: self.summarise(self.summary))
+        self.summarise(self.summary)
         if self.comm.rank == 0:
             for name in os.listdir(self.path):
                 if name not in keep and (RESULTS.fullmatch(name) or name.startswith(PART)):
                     remove(self.path / name)
 
     def summarise(self, summary: Mapping[str, Any]) -> Path:
-        """Write summary.json, on rank 0."""
+        """Write summary.json."""
+        return self.first_does(lambda: self._summarise(summary))
+
+    def _summarise(self, summary: Mapping[str, Any]) -> Path:
         self.summary = {"versions": {"rotfem": __version__}, **summary}
         return write_text(self.path / SUMMARY, json_text(self.summary))
 
-    def grow(self, name: str, table: Table) -> LiveTable | None:
-        """Return a table that is on disk while it grows; None on other ranks than the first."""
+    def grow(self, name: str, table: Table) -> None:
+        """Write a table that goes on growing on disk."""
+        self.first_does(lambda: table.keep(self.path / name))
+        self._growing = table
 
-        def begin() -> None:
-            self._live = LiveTable(self.path / name, table)
+    def stop(self) -> None:
+        """Put what there is on disk at once, on rank 0, and say that the computation was interrupted."""
+        if self._growing is not None:
+            self._growing.flush()
+        self._summarise({**self.summary, "status": "interrupted"})
 
-        self.first_does(begin)
-        return self._live
-
-    def publish(self, result: Result) -> list[Path]:
-        """Write the tables of a result and its summary; return their paths."""
-        tables = self._tables(result)
-        return [*tables, self.first_does(lambda: self.summarise(result.summary))]
-
-    def _tables(self, result: Result) -> list[Path]:
+    def publish(self, texts: Mapping[str, str]) -> list[Path]:
+        """Write tables, file name ↦ text; return their paths."""
         self.begin()
-        return self.first_does(lambda: [write_text(self.path / name, text) for name, text in result.texts().items()])
+        self._growing = None
+        return self.first_does(lambda: [write_text(self.path / name, text) for name, text in texts.items()])
 
-    def write(self, result: Result, plots: bool, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
-        """Write a result, tables first, then large files and figures; return what went wrong with these."""
-        fields: Writer | None = getattr(result, "fields", None)
-        writers = [(write, False) for write in (*result.large(), *further, *([result.draw] if plots else []))]
-        if fields is not None:
-            writers.append((fields, result.summary.get("shared") == "mesh"))
-        self._tables(result)
-        self.summary = {**result.summary, "status": RUNNING}
-        found = [self._problem(write, together) for write, together in writers]
-        problems = [problem for problem in found if problem is not None]
-        lost = [f"not written: {problem}" for problem in problems if isinstance(problem, OutputError)]
-        result.summary["warnings"] = [*result.summary["warnings"], *lost]
-        self.first_does(lambda: self.summarise(result.summary))
-        return problems
-
-    def add(self, result: Result, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
-        """Write the summary of a result that is written already, and what else is wanted; return what went wrong."""
-        found = [self._problem(write, False) for write in further]
-        self.first_does(lambda: self.summarise(result.summary))
-        return [problem for problem in found if problem is not None]
-
-    def _problem(self, write: Writer, together: bool) -> OutputError | SceneError | None:
+    def attempt(self, write: Writer, together: bool = False) -> OutputError | SceneError | None:
         """Write files on rank 0, or on all ranks together; return the error of the first rank that has one."""
         problem = None
         if together or self.comm.rank == 0:
@@ -227,36 +202,3 @@ def remove(path: Path) -> None:
     else:
         with suppress(OSError):
             path.unlink()
-
-
-class LiveTable:
-    """CSV file of a table that grows: new rows are on disk once a second, until the disk is full.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-
-    def __init__(self, path: Path, table: Table):
-        self._table, self._rows, self._written = table, len(table), monotonic()
-        with writing(path):
-            self._file = open(write_text(path, csv_text(table.arrays())), "ab", buffering=0)  # noqa: SIM115
-
-    def update(self) -> None:
-        """Write the rows that are new, if a second has passed since that was done."""
-        if monotonic() - self._written >= 1.0:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the rows that are new, by one call of the system."""
-        new = self._table.rows(self._rows)
-        self._rows, self._written = self._rows + len(new), monotonic()
-        try:
-            self._file.write("".join(map(line, new)).encode())
-        except OSError:
-            self._written = inf  # no rows after a gap; all are written again at the end
-
-    def close(self) -> None:
-        """Write what is new, and close the file."""
-        if self._written < inf:
-            self.flush()
-        self._file.close()

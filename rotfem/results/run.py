@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,30 +55,6 @@ class StationHistory:
     def to_xarray(self) -> xarray.Dataset:
         """Return the quantities over `t` (s) and `x` (m)."""
         return dataset(self.columns.variables(), {})
-
-
-class Table:
-    """Columns of equal length that grow by rows; their names are in the order they are written."""
-
-    def __init__(self, columns: Iterable[str]):
-        self.columns = tuple(columns)
-        self._rows: list[tuple[float, ...]] = []
-
-    def append(self, row: Iterable[float]) -> None:
-        """Add one row in the order of the columns."""
-        self._rows.append(tuple(map(float, row)))
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def rows(self, first: int = 0) -> list[tuple[float, ...]]:
-        """Return the rows from the one of that number on."""
-        return self._rows[first:]
-
-    def arrays(self) -> dict[str, Array]:
-        """Return name ↦ array of all values so far."""
-        values = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), len(self.columns))
-        return {name: values[:, i].copy() for i, name in enumerate(self.columns)}
 
 
 @dataclass(repr=False)

@@ -16,10 +16,9 @@ import pytest
 
 import rotfem
 from rotfem import ComputationError, SceneError
+from rotfem.commands import run_store
 from rotfem.commands.run import Simulation
-from rotfem.commands.run_store import interval
-from rotfem.results import checkpoint_file
-from rotfem.results.checkpoint_file import read_checkpoint
+from rotfem.commands.run_store import interval, read_checkpoint
 from rotfem.results.files import read_csv
 from rotfem.scene import as_scene
 from rotfem.structures.reference_rotation import SectionTurns
@@ -217,17 +216,12 @@ def checkpoint(folder: Path, rotfem: Any) -> Path:
     return folder / "out" / "checkpoint.npz"
 
 
-def test_arrays_of_a_checkpoint_have_the_names_of_what_they_are(checkpoint: Path) -> None:
-    with np.load(checkpoint, allow_pickle=False) as file:
-        assert {f"processes.0.state.{name}" for name in ("q", "v", "a")} | {"rows"} <= set(file.files)
-
-
 def test_damaged_and_foreign_checkpoints_are_refused(checkpoint: Path, rotfem: Any) -> None:
     whole = checkpoint.read_bytes()
     for length in (0, 5, 700, len(whole) // 2, len(whole) - 1):
         checkpoint.write_bytes(whole[:length])
         assert "is damaged, or no checkpoint" in refused(rotfem, "--resume")
-    start = whole.index(b"processes.0.state.q.npy") + 200  # within the numbers, which have a check sum
+    start = whole.index(b"arr_1.npy") + 200  # within the numbers, which have a check sum
     checkpoint.write_bytes(whole[:start] + bytes([whole[start] ^ 1]) + whole[start + 1 :])
     assert "is damaged, or no checkpoint" in refused(rotfem, "--resume")
     checkpoint.write_bytes(whole)
@@ -237,24 +231,14 @@ def test_damaged_and_foreign_checkpoints_are_refused(checkpoint: Path, rotfem: A
     assert "is of t = 0.39 s, after time.end = 0.3 s" in refused(rotfem, "--resume", "--set", "time.end=0.3")
 
 
-def test_what_another_program_wrote_is_refused_in_words(
-    checkpoint: Path, rotfem: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = checkpoint_file.read_checkpoint(checkpoint)
+def test_what_another_program_wrote_is_refused_in_words(checkpoint: Path, rotfem: Any) -> None:
+    whole = run_store.read_checkpoint(checkpoint)
     (own,) = whole["processes"]
-    for wrong in (
-        {},
-        {**whole, "versions": None},
-        {**whole, "rows": "x"},
-        {**whole, "processes": [{**own, "state": 3.0}]},
-        {**whole, "processes": [{**own, "parts": {}}]},
-    ):
-        checkpoint_file.write_checkpoint(checkpoint, wrong)
+    for wrong in ({"rows": "x"}, {"processes": [{**own, "state": 3.0}]}, {"processes": [{**own, "parts": {}}]}):
+        run_store.write_checkpoint(checkpoint, {**whole, **wrong})
         assert "is damaged, or no checkpoint of this rotfem" in refused(rotfem, "--resume")
-    checkpoint_file.write_checkpoint(checkpoint, {**whole, "versions": {"rotfem": "0.0.9"}})
+    run_store.write_checkpoint(checkpoint, {**whole, "rotfem": "0.0.9"})
     assert "was written by rotfem 0.0.9" in refused(rotfem, "--resume")
-    monkeypatch.setattr(checkpoint_file, "FORMAT", 4)
-    assert "has format 3, this rotfem reads 4" in refused(rotfem, "--resume")
 
 
 def test_what_cannot_be_resumed_is_said(folder: Path, rotfem: Any) -> None:
@@ -279,26 +263,25 @@ class Link:
     """A record outside the program."""
 
     length: float
-    ends: tuple[Any, ...]
+    ends: Any
 
 
-def test_nothing_but_dataclasses_is_made_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_but_dataclasses_is_made_of_a_file(tmp_path: Path) -> None:
     path, link = tmp_path / "checkpoint.npz", Link(3.0, (np.ones(2), None))
-    checkpoint_file.write_checkpoint(path, {"link": link})
-    found = checkpoint_file.read_checkpoint(path)["link"]
+    run_store.write_checkpoint(path, {"link": link})
+    found = run_store.read_checkpoint(path)["link"]
     assert (type(found), found.length, found.ends[1]) == (Link, 3.0, None)
     np.testing.assert_array_equal(found.ends[0], np.ones(2))
     for value in (object(), {1.0}, 1j, np.array([object()])):
-        with pytest.raises(ComputationError, match=f"cannot hold learnt.0, a {type(value).__name__}"):
-            checkpoint_file.write_checkpoint(path, {"learnt": (value,)})
+        with pytest.raises(ComputationError, match=f"cannot hold a {type(value).__name__}"):
+            run_store.write_checkpoint(path, {"learnt": (value,)})
     for name in ("os:system", "pathlib:Path", "rotfem.analysis.schemes:np", "no.module:Link"):
-        monkeypatch.setattr(checkpoint_file, "_plain", lambda *_, name=name: {name: {}})
-        checkpoint_file.write_checkpoint(path, {})
+        run_store.write_checkpoint(path, {"learnt": {"#class": name}})
         with pytest.raises(SceneError, match="is no dataclass of rotfem"):
-            checkpoint_file.read_checkpoint(path)
+            run_store.read_checkpoint(path)
 
 
 def test_a_checkpoint_executes_nothing(checkpoint: Path, rotfem: Any) -> None:
     """A pickle, which numpy could load."""
-    np.savez(checkpoint, head=np.array([Link(1.0, ())], dtype=object))
+    np.savez(checkpoint, head=np.array([Link(1.0, None)], dtype=object))
     assert "is damaged, or no checkpoint of this rotfem (ValueError)" in refused(rotfem, "--resume")

@@ -12,9 +12,8 @@ import pytest
 from rotfem.errors import OutputError
 from rotfem.listeners import ONE_PROCESS
 from rotfem.results import ModesResult, RunResult
-from rotfem.results.files import csv_text, read_csv
-from rotfem.results.result_set import RESULTS, LiveTable, ResultFolder, read_summary, said_of
-from rotfem.results.run import Table
+from rotfem.results.files import Table, csv_text, json_text, read_csv, write_text
+from rotfem.results.result_set import RESULTS, ResultFolder, read_summary, said_of
 
 
 def run_result(value: float, shape: bool = True) -> RunResult:
@@ -109,7 +108,7 @@ def test_what_ends_unexpectedly_keeps_its_rows_and_has_failed(tmp_path: Path) ->
         assert said_of(tmp_path).startswith(f"{tmp_path}: run is running, or was killed")
         folder.close(error)
         assert read_summary(tmp_path)["status"] == status
-        assert list(read_csv(tmp_path / "history.csv")["t"]) == [0.5] * len(table)
+        assert list(read_csv(tmp_path / "history.csv")["t"]) == [0.5] * len(table.rows)
     said = f"{tmp_path}: run failed: ZeroDivisionError: by zero; history.csv has 2 rows, up to t = 0.5 s"
     assert said_of(tmp_path) == said
     with pytest.raises(OutputError, match="no results"):
@@ -124,7 +123,7 @@ def test_the_summary_says_running_until_all_is_there(tmp_path: Path) -> None:
         raise OutputError(folder / "fields.h5", "no room")
 
     with open_folder(tmp_path) as folder:
-        problems = folder.write(run_result(1.0), plots=False, further=[large])
+        problems = run_result(1.0).write_into(folder, further=[large])
     assert seen == [("running", ["history.csv", "shape.csv", "summary.json"])]
     assert [type(problem) for problem in problems] == [OutputError]
     summary = read_summary(tmp_path)
@@ -154,18 +153,17 @@ def test_names_of_all_files_are_known() -> None:
         assert not RESULTS.fullmatch(name), name
 
 
-def test_a_growing_table_is_whole_lines(tmp_path: Path) -> None:
+def test_a_growing_table_is_whole_lines_with_every_digit(tmp_path: Path) -> None:
     table, path = Table(("t", "x")), tmp_path / "history.csv"
-    live = LiveTable(path, table)
+    table.keep(path)
     assert path.read_text() == "t,x\n"
     for i in range(5):
-        table.append((0.1 * i, 1e-17 * i))
-        live.update()
-    live.flush()
-    assert path.read_text() == csv_text(table.arrays())
+        table.append((0.1 * i, 1e-17 / (i + 1)))
+        table.flush(1e3)
     table.append((1.0, np.nan))
-    live.close()
+    table.flush()
     assert path.read_text() == csv_text(table.arrays())
+    np.testing.assert_array_equal(read_csv(path)["x"], table.arrays()["x"])
 
 
 def test_a_line_that_was_cut_short_is_not_read(tmp_path: Path) -> None:
@@ -178,3 +176,18 @@ def test_a_summary_that_cannot_be_read_is_none(tmp_path: Path) -> None:
     for text in ("", "{", "[1]", json.dumps("x")):
         (tmp_path / "summary.json").write_text(text)
         assert read_summary(tmp_path) == {}
+
+
+def test_json_holds_only_what_json_knows() -> None:
+    data = {"a": np.float64(0.1), "b": np.arange(2), "c": float("nan"), "d": (1, np.inf), "e": np.bool_(True), 1: None}
+    text = json_text(data)
+    assert json.loads(text) == {"a": 0.1, "b": [0, 1], "c": None, "d": [1, None], "e": True, "1": None}
+
+
+def test_files_get_the_usual_permissions(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        path = write_text(tmp_path / "summary.json", "{}")
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == 0o640

@@ -265,7 +265,7 @@ def test_orthotropic_plate_is_an_isotropic_one_of_another_width() -> None:
 
 
 def test_point_mass_beside_the_plate() -> None:
-    with pytest.raises(SceneError, match="must be from 0 to the length"):
+    with pytest.raises(SceneError, match="is not on the plate"):
         rotfem.modes(square(0.01, structure__point_masses=[[0.5, 0.7, 1.0]]))
 
 

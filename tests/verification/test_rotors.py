@@ -148,7 +148,7 @@ def test_jeffcott_rotor() -> None:
     """On rigid bearings the disk whirls at √(48 EI/(m L³)), both critical speeds: 5e-5, as stiff as they are."""
     diagram = rotfem.campbell(shaft_on_bearings(1e9), "0:150:6")
     expected = np.sqrt(48.0 * EI / 10.0)
-    assert [c.kind for c in diagram.critical_speeds[:2]] == ["backward", "forward"]
+    assert sorted(c.kind for c in diagram.critical_speeds[:2]) == ["backward", "forward"]
     np.testing.assert_allclose([c.speed for c in diagram.critical_speeds[:2]], expected, rtol=5e-5)
     whirl = np.array([row["frequency_fixed"] for row in diagram.rows if row["whirl"] != "standing"])
     np.testing.assert_allclose(whirl, expected, rtol=5e-5)
