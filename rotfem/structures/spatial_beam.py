@@ -31,12 +31,12 @@ from dolfinx import fem
 from mpi4py import MPI
 from ufl import cross
 
+from rotfem.along import ONE
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import Body, Kinematics, Strain, Support
 from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
-from rotfem.places import ONE
 from rotfem.structures.beam import Beam
 from rotfem.structures.mode_names import Wave, shaft_wave
 from rotfem.structures.reference_rotation import SectionTurns, check_sections
@@ -104,7 +104,7 @@ class SectionTurn(Turn):
 
 @dataclass(frozen=True, kw_only=True)
 class SectionBody(Body):
-    """What is fixed in a section: a director Λ d, seen along the turned axes, or a mass at r + Λ d beside the axis.
+    """What is fixed in a section: a director Λ d, seen along the turned axes, or a mass at r + Λ d off the axis.
 
     Attributes:
         arm: d, what the director or the offset is in the undeformed beam.
