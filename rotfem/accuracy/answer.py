@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol, Self
@@ -12,7 +13,6 @@ from rotfem import registry
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, cpu_time
 from rotfem.results.distance import Distance, Series
-from rotfem.results.result import Result
 from rotfem.scene import Scene
 
 Array = npt.NDArray[Any]
@@ -61,6 +61,16 @@ class Setting:
         """Whether it is that of a history."""
         return self.scheme is not None
 
+    @property
+    def work(self) -> float:
+        """Number of nodes times the number of steps, up to a factor."""
+        cells, steps = self.elements or (1, 1), 1.0
+        if self.step is not None:
+            steps = 1.0 / self.step
+        elif self.tolerance is not None:
+            steps = self.tolerance ** (-1.0 / registry.schemes[str(self.scheme)].order)
+        return steps * (math.prod(n * self.degree for n in cells) if isinstance(cells, tuple) else cells * self.degree)
+
     def changes(self) -> dict[str, Any]:
         """Return the scene's keys ↦ values of this setting; None removes what the scene says."""
         out: dict[str, Any] = {"model.theory": self.theory, "mesh.degree": self.degree}
@@ -104,31 +114,25 @@ class Outcome(Protocol):
     @property
     def output(self) -> Any:
         """What is compared, a `Series` or a `Spectrum`."""
-        ...
 
     @property
     def steps(self) -> int:
         """Number of steps that were taken, parts of steps counted each; 0 of what has no steps."""
-        ...
 
     @property
     def stable(self) -> bool | None:
         """Whether an equilibrium is stable; None where that is not asked."""
-        ...
 
     @property
     def lines(self) -> list[Array]:
         """Coordinates (m) of all vertices of the mesh along each axis."""
-        ...
 
     @property
     def round_off(self) -> float | None:
         """Bound of the error by round-off, relative; None where none is known."""
-        ...
 
     def result(self) -> Any:
         """Return the whole result."""
-        ...
 
 
 #: Computes a variant of a scene. With times (s) it gives the output at these, else at the rows of the scene.
@@ -154,10 +158,9 @@ class Answer:
         """What is compared of it."""
         return self.outcome.output
 
-    def result(self) -> Result:
-        """Return the whole result."""
-        found: Result = self.outcome.result()
-        return found
+    def predicted(self, setting: Setting) -> float:
+        """Return the CPU time of an answer with another setting, s, by its steps and unknowns."""
+        return self.seconds * setting.work / self.setting.work
 
 
 class Answers:

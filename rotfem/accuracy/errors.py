@@ -51,6 +51,9 @@ LOOSEST = 0.5
 #: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
 FEWER = 0.75
 
+#: Relative error below which none is known: what Newton's increments leave.
+FLOOR = 1e-9
+
 #: Error from which a warning names its cures; error of a theory from which it is warned of.
 NOTICED, OUT_OF_RANGE = 0.01, 0.05
 
@@ -223,7 +226,10 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list
         out.each, error = each, max(each, default=0.0)
     out.parts[name], out.at = error, apart.at if out.at is None else out.at
     if name != "time":
-        _fill_table(out, own, found, other)
+        following = finer(own.setting)
+        out.rows = [row(found.setting, apart.size, found.seconds), row(own.setting, error, own.seconds)]
+        if other.factor > 1.0:
+            out.rows.append(row(following, error / (other.factor + 1.0), own.predicted(following), True))
     return found
 
 
@@ -264,17 +270,22 @@ def in_phase(own: Answer, other: Answer, scene: Scene) -> bool:
     return late <= IN_PHASE and omega * float(np.median(spaces)) <= 1.0
 
 
+def exact_theory(scene: Scene) -> str:
+    """Return the name of the richest exact theory of a scene's structure; "" where there is none."""
+    kind = scene.structure.type
+    exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(kind)]
+    return str(max(exact, key=lambda theory: theory.rank).name) if exact else ""
+
+
 def of_theory(out: Errors, answers: Answers, own: Answer, poor: Answer) -> float | None:
     """Return the error of a theory by an answer of it in a coarse setting; None where it is unknown."""
-    kind = answers.scene.structure.type
-    exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(kind)]
-    if not exact:
-        out.unknown.append(f"there is no exact theory of a {kind}")
+    richest = exact_theory(answers.scene)
+    if not richest:
+        out.unknown.append(f"there is no exact theory of a {answers.scene.structure.type}")
         return None
-    richest = max(exact, key=lambda theory: theory.rank)
-    rich, why = attempt(answers, replace(poor.setting, theory=richest.name))
+    rich, why = attempt(answers, replace(poor.setting, theory=richest))
     if rich is None:
-        out.unknown.append(f"there is no answer of {richest.name} to compare with: {why}")
+        out.unknown.append(f"there is no answer of {richest} to compare with: {why}")
         return None
     if own.outcome.stable and rich.outcome.stable is False:
         return 1.0  # above a buckling load that the theory does not have
@@ -282,23 +293,10 @@ def of_theory(out: Errors, answers: Answers, own: Answer, poor: Answer) -> float
     return size if math.isfinite(size) else None
 
 
-# --- what it costs ----------------------------------------------------------------------------------------------------
-
-
 def row(setting: Setting, error: float | None, seconds: float, extrapolated: bool = False) -> dict[str, Any]:
     """Return a row of the table of settings: `setting`, `error` (relative), `seconds` of CPU, `extrapolated`."""
     more = {"extrapolated": True} if extrapolated else {}
     return {"setting": setting.summary(), "words": setting.words(), "error": error, "seconds": seconds, **more}
-
-
-def _fill_table(out: Errors, own: Answer, other: Answer, how: Coarser) -> None:
-    error = out.total
-    if error is None:
-        return
-    out.rows = [row(other.setting, distance(own, other).size, other.seconds), row(own.setting, error, own.seconds)]
-    if how.factor > 1.0:
-        growth = max(1.0, own.seconds / max(other.seconds, 1e-3))
-        out.rows.append(row(finer(own.setting), error / (how.factor + 1.0), own.seconds * growth, True))
 
 
 # --- in words ---------------------------------------------------------------------------------------------------------
@@ -308,28 +306,32 @@ def percent(ratio: float | None) -> str:
     """Return a ratio in per cent with two digits, of large ones three."""
     if ratio is None:
         return "unknown"
-    return "0 %" if ratio < 5e-9 else f"{100 * ratio:.2g} %" if ratio < 0.995 else f"{100 * ratio:.3g} %"
+    if 0.0 < ratio <= FLOOR:
+        return f"< {100 * FLOOR:.0e} %"
+    return "0 %" if ratio == 0.0 else f"{100 * ratio:.2g} %" if ratio < 0.995 else f"{100 * ratio:.3g} %"
+
+
+def _known(error: float | None) -> float | None:
+    """Return an error as it is shown: of nothing no less than is known of it."""
+    return None if error is None else max(error, FLOOR)
 
 
 def error_line(summary: Mapping[str, Any]) -> str:
     """Return the line about `error` of a summary."""
-    parts = ", ".join(f"{WORDS[n]} {percent(summary[n])}" for n in WORDS if n in summary)
+    parts = ", ".join(f"{WORDS[n]} {percent(_known(summary[n]))}" for n in WORDS if n in summary)
     if summary["total"] is None:
         return f"error: unknown ({parts})"
-    return f"error (estimated): {percent(summary['total'])} ({parts})"
+    return f"error (estimated): {percent(_known(summary['total']))} ({parts})"
 
 
 def table_lines(rows: list[dict[str, Any]]) -> list[str]:
     """Return the table of settings as lines."""
-    if not rows:
-        return []
-    cells = [("setting", "error", "CPU s")]
+    cells = [("setting", "error", "CPU s")] if rows else []
     for r in rows:
-        about = "≈ " if r.get("extrapolated") else ""
-        size = r.get("error")
-        error = r.get("failed", "–" if size is None else f"{size:.1e}" if size >= 1e-9 else "0")
-        cells.append((r["words"], about + error, about + f"{r['seconds']:.2g}"))
-    wide = [max(len(line[i]) for line in cells) for i in range(3)]
+        about, size = "≈ " if r.get("extrapolated") else "", _known(r.get("error"))
+        error = r.get("failed", "–" if size is None else f"{about}{size:.1e}" if size > FLOOR else f"< {FLOOR:.0e}")
+        cells.append((r["words"], error, f"{about}{r['seconds']:.2g}"))
+    wide = [max((len(line[i]) for line in cells), default=0) for i in range(3)]
     return [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells]
 
 
@@ -339,7 +341,7 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
     model = errors.parts.get("model") or 0.0
     if model > OUT_OF_RANGE:
         how = "out of its range" if model >= 1.0 else f"in error by about {100 * model:.2g} %"
-        said.append(f'model.theory = "{own.theory}" is {how} here; "{_exact_name(scene)}" is exact')
+        said.append(f'model.theory = "{own.theory}" is {how} here; "{exact_theory(scene)}" is exact')
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
     allowed = max(NOTICED, own.tolerance or 0.0)
     if rest > allowed and not errors.each:
@@ -348,18 +350,11 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
             cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")
         elif own.tolerance is not None:
             cures.insert(0, f"time.tolerance = {rounded_down(own.tolerance * allowed / 2 / rest)}")
-        off = (
-            f"the tip may be in error by {percent(rest)} of its largest displacement"
-            if own.moving
-            else (f"the result may be in error by {percent(rest)}")
+        what, of = ("tip", " of its largest displacement") if own.moving else ("result", "")
+        said.append(
+            f"the {what} may be in error by {percent(rest)}{of}; to reduce it: {', '.join(cures)}, or --accuracy"
         )
-        said.append(f"{off}; to reduce it: {', '.join(cures)}, or --accuracy")
     return said
-
-
-def _exact_name(scene: Scene) -> str:
-    exact = [theory for theory in registry.theories if theory.exact and theory.holds_for(scene.structure.type)]
-    return str(max(exact, key=lambda theory: theory.rank).name) if exact else ""
 
 
 def rounded_down(x: float) -> str:

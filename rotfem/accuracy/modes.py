@@ -6,7 +6,6 @@ eigenvalue that is zero to round-off it is relative to the smallest other one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -38,13 +37,11 @@ class Modes:
         analysis: of them.
         spinning: equilibrium and eigenpairs.
         count: number of pairs that count; the others are there to be paired with.
-        finish: makes the whole result of it.
     """
 
     analysis: ModalAnalysis
     spinning: Spinning
     count: int
-    finish: Callable[[Modes], Any] = lambda modes: modes
     steps: int = 0
     stable: bool | None = None
 
@@ -64,9 +61,9 @@ class Modes:
         """Coordinates (m) of the vertices along each axis."""
         return lines(self.analysis.system)
 
-    def result(self) -> Any:
-        """Return the whole result."""
-        return self.finish(self)
+    def result(self) -> Modes:
+        """Return this, of which the commands make their results."""
+        return self
 
 
 def sampled(analysis: ModalAnalysis, vectors: Array) -> Array:
@@ -102,7 +99,6 @@ def modal_answers(
     scene: Scene,
     analysis: ModalAnalysis,
     speed: float,
-    finish: Callable[[Modes], Any] = lambda modes: modes,
     compiled: dict[str, ModalAnalysis] | None = None,
 ) -> Answers:
     """Return the answers that are the modes of a scene at a speed (rad/s).
@@ -111,7 +107,6 @@ def modal_answers(
         scene: whose mesh and theory are varied.
         analysis: of its own modes, with terms and all that a script adds.
         speed: Ω.
-        finish: makes the whole result of an answer.
         compiled: mesh and theory ↦ analysis, kept for other speeds; None to keep none.
     """
     count = scene.modes.count
@@ -130,7 +125,7 @@ def modal_answers(
         if "count" in scene.modes.model_fields_set:
             there.check_count(count)
         found = there.at(speed, min(count + SPARE, most))
-        return Modes(there, found, count - int(found.rigid), finish)
+        return Modes(there, found, count - int(found.rigid))
 
     return Answers(scene, compute, moving=False)
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers
 from rotfem.accuracy.errors import WORDS, Errors, estimate, warnings_of
-from rotfem.accuracy.refine import Clock, Walk, walk
+from rotfem.accuracy.ladder import Clock, Walk, walk
 from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, InputError, Stopped
 from rotfem.listeners import Hint
@@ -76,20 +76,20 @@ def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish:
     def best(**entries: Any) -> R:
         assert found.best is not None
         answer, errors = found.best
-        result = finish(answer.result(), errors)
+        result = finish(answer.outcome.result(), errors)
         how: dict[str, Any] = {
             "asked": scene.accuracy,
             "of": of,
             "met": found.met,
             "estimated": errors.total,
             "chosen": answer.setting.summary(),
-            "attempts": found.rows,
+            "attempts": [row for row in found.rows if not row.get("extrapolated")],
         }
         if clock.budget is not None:
             how["budget"] = clock.summary()
         total = perf_counter() - started
         timings = {**result.summary["timings"], "choice": max(0.0, total - result.summary["timings"]["total"])}
-        more = {"error": errors.summary(), "settings": found.table(), "timings": {**timings, "total": total}}
+        more = {"error": errors.summary(), "settings": found.rows, "timings": {**timings, "total": total}}
         return result.with_summary(scene=scene.digest(), accuracy=how, **more, **entries)
 
     try:

@@ -91,7 +91,7 @@ def speed_of(scene: Scene, problem: ProblemData) -> float:
 def led_to_accuracy(scene: Scene, analysis: ModalAnalysis, speed: float, compute: Callable[..., R]) -> R:
     """Return what a command computes of the modes of a scene, with the setting whose modes are within its accuracy."""
     check_of(scene, ("frequencies",), "modes and campbell")
-    answers, comm = modal_answers(scene, analysis, speed, lambda found: found), analysis.everyone
+    answers, comm = modal_answers(scene, analysis, speed), analysis.everyone
 
     def finish(found: Modes, errors: Errors) -> R:
         setting = Setting(found.analysis.problem.theory.name, *_mesh_of(found.analysis))

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rotfem.accuracy.answer import Answers, Setting
-from rotfem.accuracy.ladder import TOLERANCES, ladder
-from rotfem.accuracy.refine import Clock, OverBudget, Walk, ratio_of, reduced, walk
+from rotfem.accuracy.ladder import TOLERANCES, Clock, OverBudget, ladder, ratio_of, reduced, walk
 from rotfem.errors import ComputationError
 from rotfem.results.distance import Series
 from rotfem.scene import Scene
@@ -70,16 +69,16 @@ def test_the_first_answer_that_is_within_the_accuracy_is_taken(accuracy: float) 
     answer, errors = found.best
     true = abs(answer.output.values[0, 0] - 1.0)
     assert true <= errors.total <= accuracy
-    assert len(found.rows) <= 3
-    assert answer.setting.tolerance == found.rows[-1]["setting"]["tolerance"]
+    assert len(found.rows) <= 4
+    assert found.rows[-1]["extrapolated"]
 
 
 def test_what_stagnates_is_not_taken_for_exact() -> None:
-    """Answers that jump by 0.02 at every rung, by turns, have no smaller error."""
+    """Answers that jump by 0.02 at every rung, by turns, have an error of a quarter of that at least."""
     turn = itertools.cycle([0.02, 0.0])
     found = walk(answers(lambda tau: next(turn)), 5e-3, Clock(None))
     assert not found.met
-    assert found.rows[-1]["error"] >= 0.02
+    assert all(row["error"] > 5e-3 for row in found.rows)
 
 
 def test_rungs_that_fail_are_passed_over() -> None:
@@ -90,24 +89,26 @@ def test_rungs_that_fail_are_passed_over() -> None:
         walk(answers(lambda tau: None), 1e-2, Clock(None))
 
 
-def test_the_best_answer_is_kept_where_the_budget_ends() -> None:
-    clock, found = Clock(100.0), Walk()
-    used = iter([0.0, 10.0, 99.9, 99.9, 99.9])
+def test_an_answer_that_takes_more_than_is_left_is_refused() -> None:
+    clock = Clock(100.0)
+    used = iter([10.0, 99.9])
     clock.used = lambda: next(used)  # type: ignore[method-assign]
-    clock.begin("a", None)
     with pytest.raises(OverBudget, match=r"about 95 s, 90 s of accuracy_budget are left"):
         clock.begin("b", 95.0)
     assert clock.summary()["wanted"] == 95.0
-    assert found.predicted() is None
 
 
-def test_a_distance_is_divided_by_what_the_order_says_or_what_is_seen() -> None:
-    assert reduced(1e-3, np.inf, 5.0) == pytest.approx(1.5e-3 / 4)
-    assert reduced(1e-3, 4e-3, 5.0) == pytest.approx(1.5e-3 / 3)
-    assert reduced(1e-3, 1e-3, 5.0) == pytest.approx(7.5e-3)  # it does not converge
-    assert reduced(0.5, np.inf, 5.0) == pytest.approx(0.75)
-    assert reduced(np.inf, np.inf, 5.0) is None
+def test_a_distance_is_divided_by_what_the_order_says() -> None:
+    assert reduced(1e-3, np.inf, 5.0) == pytest.approx(2e-3 / 4)
+    assert reduced(1e-3, 1e-3, 5.0) == pytest.approx(2e-3 / 4 * 1.25)  # 1.25e-3 was reported as 1e-3
+    assert reduced(0.5, np.inf, 5.0) == pytest.approx(1.0)
+    assert reduced(np.inf, np.inf, 5.0) == np.inf
     assert reduced(0.0, 1.0, 5.0) == 0.0
+
+
+def test_the_time_of_an_answer_follows_from_steps_and_nodes() -> None:
+    a, b = Setting("reissner", (4, 2), 2, "esdirk4", 1e-2), Setting("reissner", (8, 4), 2, "esdirk4", 1e-2 / 16)
+    assert b.work / a.work == pytest.approx(8.0)
 
 
 def test_meshes_of_a_plate_are_as_exact_as_their_cells_say() -> None:
