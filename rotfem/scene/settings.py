@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, StrictBool, Tag, ValidationInfo
 
 from rotfem import registry
+from rotfem.along import FORCES, RESULTANTS, STRAINS
 from rotfem.errors import show
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, as_names, problem, unit
@@ -23,7 +24,6 @@ from rotfem.scene.values import (
     increasing,
     parameters_of,
 )
-from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:

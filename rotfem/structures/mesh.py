@@ -14,10 +14,10 @@ import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
+from rotfem.along import ONE, apart
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
-from rotfem.places import ONE, apart
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -185,7 +185,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
 
 
 def _load(gmsh: Any, path: Path) -> None:
-    """Start gmsh, and load the file under another name: a script "<name>.opt" beside what it reads would be run."""
+    """Start gmsh, and load the file under another name: a script "<name>.opt" next to what it reads would be run."""
     gmsh.initialize([], False, False, False)
     gmsh.option.setNumber("General.Terminal", 0)
     with TemporaryDirectory(prefix="rotfem-") as folder:
