@@ -75,33 +75,25 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
     It is a pretwist above 2 rad, a property that changes 30 times from row to row, radii of gyration of stiffness and
     mass 10 times apart, or a centre 4 radii of gyration away.
     """
-    out = []
     x = columns.get("x", np.zeros(0))
-    if "pretwist" in columns and (most := np.max(np.abs(columns["pretwist"]))) > 2.0:
-        out.append(f"the pretwist reaches {most:.4g} rad at x = {x[np.argmax(np.abs(columns['pretwist']))]:.4g} m")
+    found: list[tuple[Array, Array, float, str]] = []  # places, values, the largest that is none, and what they are
+    if "pretwist" in columns:
+        found.append((x, np.abs(columns["pretwist"]), 2.0, "the pretwist is {:.4g} rad"))
     for name in columns.keys() & {"EA", "GJ", "EI", "EI2", "EI3", "GA", "GA2", "GA3", "mass_per_length"}:
-        rows, values = x[::BETWEEN], columns[name][::BETWEEN]
-        ratio = np.abs(np.log(values[1:] / values[:-1])) if np.all(values > 0.0) else np.zeros(0)
-        if ratio.size and (most := float(np.exp(ratio.max()))) > 30.0:
-            i = int(np.argmax(ratio))
-            out.append(f"{name} changes {most:.3g} times from x = {rows[i]:.4g} to {rows[i + 1]:.4g} m")
+        rows = columns[name][::BETWEEN]
+        if np.all(rows > 0.0):
+            times = np.exp(np.abs(np.diff(np.log(rows))))
+            found.append((x[::BETWEEN], times, 30.0, f"{name} changes {{:.3g}} times to the next row"))
     for axis, other in (("2", "z"), ("3", "y")):
         if f"EI{axis}" not in columns:
             continue
         stiff = np.sqrt(columns[f"EI{axis}"] / columns["EA"])
         heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / columns["mass_per_length"])
-        far = np.where(heavy > 0.0, np.maximum(heavy / stiff, stiff / np.where(heavy > 0.0, heavy, 1.0)), 1.0)
-        if np.max(far) > 10.0:
-            i = int(np.argmax(far))
-            out.append(
-                f"at x = {x[i]:.4g} m the radius of gyration about axis {axis} is {stiff[i]:.3g} m of the stiffness, "
-                f"{heavy[i]:.3g} m of the mass"
-            )
+        apart = np.exp(np.abs(np.log(np.where(heavy > 0.0, heavy / stiff, 1.0))))
+        what = f"radii of gyration about axis {axis} of stiffness and mass differ {{:.3g}} times"
+        found.append((x, apart, 10.0, what))
         for center in ("mass_center", "tension_center", "shear_center"):
             away = np.abs(columns[f"{center}_{other}"]) / stiff
-            if np.max(away) > 4.0:
-                i = int(np.argmax(away))
-                out.append(
-                    f"at x = {x[i]:.4g} m {center} lies {away[i]:.3g} radii of gyration from the axis in {other}"
-                )
-    return sorted(out)
+            found.append((x, away, 4.0, f"{center} lies {{:.3g}} radii of gyration from the axis in {other}"))
+    worst = [(where, y, int(np.argmax(y)), what) for where, y, limit, what in found if np.max(y, initial=0.0) > limit]
+    return sorted(f"{what.format(y[i])} at x = {where[i]:.4g} m" for where, y, i, what in worst)

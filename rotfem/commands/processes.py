@@ -70,18 +70,17 @@ def raise_first(problems: Iterable[Exception | None]) -> None:
 # --- what the summaries of all commands have in common ----------------------------------------------------------------
 
 
-def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
-    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing"."""
-    if comm.size == 1:
-        return {"ranks": 1}
-    copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
-    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else copies}
-
-
 def summary(command: str, scene: Scene, comm: MPI.Comm, inner: MPI.Comm | None = None) -> dict[str, Any]:
-    """Return what every summary has; `inner` are the processes that the system is discretised on, all if None."""
+    """Return what every summary has; `inner` are the processes that the system is discretised on, all if None.
+
+    On several processes `shared` is "mesh", "speeds", "frequencies" or "nothing".
+    """
     out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name, "versions": versions()}
-    return {**out, **what_is_shared(command, comm, inner or comm), "scene": scene.digest()}
+    out["ranks"] = comm.size
+    if comm.size > 1:
+        copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
+        out["shared"] = "mesh" if (inner or comm).size > 1 else copies
+    return {**out, "scene": scene.digest()}
 
 
 def timings(parts: Mapping[str, float], started: float, before: Mapping[str, float] | None = None) -> dict[str, float]:

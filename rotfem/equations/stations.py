@@ -29,10 +29,10 @@ import ufl
 from dolfinx import fem, la
 from ufl.algorithms import expand_derivatives
 
+from rotfem.along import FORCES, RESULTANTS, STRAINS
 from rotfem.equations.system import System
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
-from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import PointValues
 

@@ -325,10 +325,10 @@ class ShortTable:
             out += [" " * (sum(most) + 2 * len(most)) + text for text in folded[1:]]
         return out
 
-    def html(self) -> str:
+    def html(self, most: int = SHORT) -> str:
         """Return the table as HTML, its first rows where there are many."""
-        more = len(self.rows) - SHORT
-        rows = self.rows if more <= 0 else [*self.rows[:SHORT], (f"… and {more} more",)]
+        more = len(self.rows) - most
+        rows = [*self.rows[:most], *([(f"… and {more} more",)] if more > 0 else [])]
         cells = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows)
         head = "".join(f"<th>{escape(text)}</th>" for text in self.head)
         return f"<table><thead><tr>{head}</tr></thead><tbody>{cells}</tbody></table>"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hi
 import numpy as np
 from pydantic import AfterValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
 
-from rotfem.places import apart
+from rotfem.along import apart
 from rotfem.scene.blades.deck import Asked, keys_of
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.plates import PlateStructure

@@ -26,7 +26,6 @@ from rotfem.scene.table import (
     along,
     as_name,
     choose_way,
-    did_you_mean,
     problem,
     problems_at,
     unit,
@@ -214,10 +213,6 @@ def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
         given = {name: column.pop(name) for name in parts if name in column}
         if given:
             out[key] = list(zip(x, *(given.get(name, [0.0] * len(x)) for name in parts), strict=True))
-    for name in column:
-        if name.startswith(tuple(f"{key}_" for key in entries)) and name != "mass_per_length":
-            hint = did_you_mean(name, [part for parts in entries.values() for part in parts])
-            raise problem("", str(path), f'unknown column "{name}"; {hint}upper triangles only, as stiffness_12')
     return out | {name: list(zip(x, values, strict=True)) for name, values in column.items()}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, StrictBool, Tag, ValidationInfo
 
 from rotfem import registry
+from rotfem.along import FORCES, RESULTANTS, STRAINS
 from rotfem.errors import show
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, as_names, problem, unit
@@ -23,7 +24,6 @@ from rotfem.scene.values import (
     increasing,
     parameters_of,
 )
-from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
@@ -211,9 +211,8 @@ def _counts_for(aspect: float) -> tuple[int, int]:
 
 def estimates_error(scheme: type) -> bool:
     """Return whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
-    base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
-    own: Any = scheme
-    return own.local_error is not base.local_error
+    owner = next(base for base in scheme.__mro__ if "local_error" in base.__dict__)
+    return "registry" not in owner.__dict__
 
 
 def usual(given: Mapping[str, Any]) -> str:

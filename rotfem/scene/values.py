@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Tag, ValidationInfo
 
-from rotfem.places import ONE
+from rotfem.along import ONE
 from rotfem.registry import Registry
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, problem, unit

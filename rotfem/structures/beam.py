@@ -16,10 +16,10 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from rotfem.along import ONE, apart
 from rotfem.mechanics.bodies import Body, RootSpring, Strain
 from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
-from rotfem.places import ONE, apart
 from rotfem.structures.mesh import beam_nodes, boundary_tags
 from rotfem.structures.mode_names import WORDS, ModeName, in_phase, sign_changes
 from rotfem.structures.points import Points
@@ -107,7 +107,7 @@ class Beam(Structure):
         return 1 + next(s.value for s in strains if s.name == "axial")
 
     def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
-        """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""
+        """Return the strains of a section as one vector, in the order of `rotfem.along.STRAINS`."""
         raise NotImplementedError
 
     def stored(self, values: Any) -> list[Strain]:

@@ -14,10 +14,10 @@ import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
+from rotfem.along import ONE, apart
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
-from rotfem.places import ONE, apart
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from numpy.polynomial import legendre
 
-from rotfem.places import ONE
+from rotfem.along import ONE
 
 Array = npt.NDArray[np.float64]
 

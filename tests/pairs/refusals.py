@@ -40,7 +40,7 @@ LOOSE = tuple(
     {"root": ("hinge",), "theory": ("consistent_linear",), **STEADY, "motion": ("rest",), **loaded}
     for loaded in (
         {"structure": ("planar",), "loads": (*ACROSS, "follower")},
-        {"structure": ("spatial",), "loads": ("tip", "gravity")},
+        {"structure": ("spatial",), "loads": ("tip",)},
     )
 )
 REFUSALS = (
@@ -58,8 +58,10 @@ REFUSALS = (
     Refusal({"command": ("response",), "loads": but("loads", "harmonic")}, "needs a harmonic load"),
     *(Refusal(choices, "nothing holds the root's hinge") for choices in LOOSE),
 )
-#: What would compile long for little: estimates compare with richer theories.
+#: What would compile long for little: estimates compare with richer theories; and the double zero of a hub and a hinge
+#: that nothing holds, which has one eigenvector, so half the digits, and fails in words.
 UNTRIED: tuple[Levels, ...] = (
+    {"command": ("modes", "campbell"), "root": ("hinge",), "motion": FREE, "loads": ("follower",)},
     {"structure": ("spatial", "plate"), "output": ("estimated",)},
     {"structure": ("spatial", "plate"), "time": ("accuracy",)},
     {"structure": ("spatial",), "ranks": ("2",)},

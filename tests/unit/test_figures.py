@@ -9,11 +9,11 @@ import pytest
 from matplotlib.contour import ContourSet
 from matplotlib.tri import Triangulation
 
+from rotfem.along import FORCES, STRAINS
 from rotfem.results import CampbellResult, CheckResult, ModesResult, RunResult
 from rotfem.results.modes import ResponseResult
 from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.run import StationHistory
-from rotfem.section_quantities import FORCES, STRAINS
 from tests.figures import check
 from tests.unit.test_result_classes import ALL
 

@@ -253,7 +253,11 @@ def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
         (BLADE_CSV.replace("x,", "r,"), {"file": "blade.csv"}, 'x first, not "r"'),
         (BLADE_CSV.replace("EI2", "EI3"), {"file": "blade.csv"}, 'column "EI3" stands twice'),
         (BLADE_CSV.replace("EI2", "EIy"), {"file": "blade.csv"}, r"section\.EIy: unknown key"),
-        (BLADE_CSV.replace("mass_center_y", "mass_center_2"), {"file": "blade.csv"}, 'unknown column "mass_center_2"'),
+        (
+            BLADE_CSV.replace("mass_center_y", "mass_center_2"),
+            {"file": "blade.csv"},
+            r"section\.mass_center_2: unknown key",
+        ),
         (BLADE_CSV.replace("1.5, 1", "1.5, one"), {"file": "blade.csv"}, 'line 4, column 3: "one"'),
         (BLADE_CSV.replace(", -0.5", ""), {"file": "blade.csv"}, "line 4 has 9 columns; must be 10"),
         (BLADE_CSV.replace("\n2,", "\n1,"), {"file": "blade.csv"}, "it ends at 1"),

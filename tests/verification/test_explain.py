@@ -15,10 +15,8 @@ from rotfem.commands.explain import HISTORY, MODES, NOTICEABLE, RESOLVED
 from rotfem.commands.printed import report
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
-from rotfem.errors import ComputationError
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
-from rotfem.numerics.eigenproblem import Pencil
 from rotfem.registry import register
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
@@ -110,50 +108,6 @@ def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
     assert np.array_equal(state_of(system, 1.3), whole)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("theory", ["consistent_linear", pytest.param("reissner", marks=pytest.mark.nightly)])
-def test_bodies_beside_the_axis_are_switched_too(theory: str) -> None:
-    """A spatial beam with a tip mass off its axis; each new form takes ten seconds and more to compile."""
-    section = {"EA": 400.0, "GA2": 130.0, "GA3": 130.0, "GJ": 0.8, "EI2": 1.0, "EI3": 2.0, "mass_per_length": 1.0}
-    inertia = {"rotary_inertia2": 2e-3, "rotary_inertia3": 4e-3}
-    tables = {
-        "structure": {
-            **{"type": "spatial_beam", "length": 1.0, "hub_radius": 0.2, "section": section | inertia},
-            **{"tip_mass": 0.3, "tip_inertia": 0.01, "tip_offset": [0.1, 0.05, -0.05]},
-        },
-        "motion": {"type": "spin_up", "speed": 1.5, "duration": 3.0},
-        "model": {"theory": theory},
-        "mesh": {"elements": 2},
-        "time": {"end": 4.0, "step": 0.01},
-    }
-    full = Problem.of(scene(tables))
-    system = compile_system(full)
-    for name in ("tip_mass", "rotary_inertia"):
-        rest = tuple(e for e in full.effective_effects() if e != name)
-        expected = state_of(compile_system(full.replace(effects=rest)), 1.3)
-        system.leave_out({name})
-        size = np.abs(expected).max()
-        assert np.abs(state_of(system, 1.3) - expected).max() < 1e-12 * size  # rounding
-
-
-def test_switches_reach_the_hub() -> None:
-    torque = {"type": "torque", "hub_inertia": 0.5, "pulses": [[0.0, 1.0, 0.2]]}
-    full = Problem.of(scene(ALL, {"motion": torque}))
-    effects, switched = full.effective_effects(), compile_system(full)
-    assert "hub_coupling" in effects
-    for name in ("coriolis", "centrifugal", "euler", "tip_mass", "gravity"):
-        values = []
-        switched.leave_out({name})
-        for system in (compile_system(full.replace(effects=tuple(e for e in effects if e != name))), switched):
-            system.row.angle.values[:] = (0.3, 2.0, 1.0)
-            state_of(system, 0.5)
-            values.append(system.row.residual(0.5))
-        assert values[1] == pytest.approx(values[0], rel=1e-12)  # rounding
-    switched.leave_out({"hub_coupling"})
-    assert switched.hub is not None
-    assert not switched.row.coupled
-
-
 @pytest.fixture
 def add() -> Iterator[Callable[[Any], None]]:
     """Registers for the length of a test."""
@@ -213,13 +167,9 @@ def test_rows_of_a_blade_whose_hinge_nothing_holds() -> None:
         assert not {"speed_ratio", "spin_rate_change"} & set(found.summary["groups"])
 
 
-@pytest.mark.parametrize(
-    "tables",
-    [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.nightly)],
-)
-def test_rows_are_the_distances_of_two_runs(tables: dict[str, Any]) -> None:
+def test_rows_are_the_distances_of_two_runs() -> None:
     """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible."""
-    result = rotfem.explain(scene(tables), check=True)
+    result = rotfem.explain(scene(SPIN_UP), check=True)
     compared = 0
     for row in result.rows:
         assert set(row["truth"]) == {HISTORY, MODES}
@@ -287,13 +237,7 @@ def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
 
 
 @pytest.mark.parametrize(
-    "initial",
-    [
-        {"velocity": [[0, 0, 0], [10.0, 0, 1.0]]},
-        {"state": "steady", "mode": 1, "amplitude": 0.1},
-        {"tip_displacement": 0.5},
-    ],
-    ids=["velocity", "mode", "released"],
+    "initial", [{"state": "steady", "mode": 1, "amplitude": 0.1}, {"tip_displacement": 0.5}], ids=["mode", "released"]
 )
 def test_an_explanation_starts_as_its_scene_does(initial: dict[str, Any]) -> None:
     """All that moves does since the start: without the spin nothing else of it would be there to be compared."""
@@ -308,11 +252,10 @@ def test_an_explanation_starts_as_its_scene_does(initial: dict[str, Any]) -> Non
 @pytest.mark.parametrize(
     "loads",
     [
-        {"tip_force": lambda t: [0.0, 20.0 * np.sin(3.0 * t)]},
         {"tip_force": {"table": [[0, 0, 0], [0.5, 0, 30.0], [2.0, 0, 0]], "kind": "follower"}},
         {"gravity": [0.0, -9.81]},
     ],
-    ids=["function", "follower", "gravity that turns"],
+    ids=["follower", "gravity that turns"],
 )
 def test_an_explanation_takes_the_loads_of_a_run(loads: dict[str, Any]) -> None:
     """Within a factor of 2: the explanation takes several steps of the scene as one."""
@@ -355,10 +298,9 @@ def test_change_by_damping_is_the_damping_ratio() -> None:
     assert rows["damping"]["estimate"][MODES] == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
 
 
-@pytest.mark.parametrize("bending", [2.0e4, pytest.param(3.0e4, marks=pytest.mark.nightly)])
-def test_change_by_damping_that_long_steps_hide(bending: float) -> None:
+def test_change_by_damping_that_long_steps_hide() -> None:
     """Steps damp and delay the undamped vibration of a beam in gusts more than the damped one."""
-    section = {"EA": 2.2e8, "GA": 7.0e7, "EI": bending, "mass_per_length": 8.0, "rotary_inertia": 9e-4}
+    section = {"EA": 2.2e8, "GA": 7.0e7, "EI": 2.0e4, "mass_per_length": 8.0, "rotary_inertia": 9e-4}
     beam = {"type": "planar_beam", "length": 4.2, "hub_radius": 0.3, "section": section}
     gusts = [[0, 0, 0], [4, 0, 20.0], [9, 0, -10.0], [15, 0, 25.0], [22, 0, 5.0], [30, 0, 0]]
     asked = Scene.from_dict(
@@ -405,15 +347,6 @@ def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> No
     assert "not in model.effects" in airless.effects["drag"]["why"]
 
 
-def test_an_effect_left_out_by_a_list_is_estimated_too() -> None:
-    asked = scene(SPIN_UP, {"model.effects": ["centrifugal", "euler"], "model.theory": "consistent_linear"})
-    rows = {row["name"]: row for row in rotfem.explain(asked).rows}
-    assert not rows["coriolis"]["included"]
-    assert rows["euler"]["included"]
-    assert "not in model.effects" in rows["coriolis"]["why"]
-    assert rows["coriolis"]["estimate"][HISTORY] > 0.0
-
-
 def test_groups_of_the_spin_up() -> None:
     """ω₁ as above; r = √(EI/EA) = 0.02236 m; the largest rate of the spin-up is 2 · speed/duration."""
     heavy = scene(SPIN_UP, {"structure.tip_mass": 3.0, "structure.hub_radius": 2.0})
@@ -437,8 +370,8 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
 
 def test_steps_of_more_than_a_period_do_not_matter() -> None:
     """The comparison has steps of its own; the truth is of adaptive steps."""
-    asked = scene(SPIN_UP, {"time": {"end": 20.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED})
-    fine = asked.replace({"time": {"end": 20.0, "tolerance": 1e-4, "output_step": 0.05}, "output.error": False})
+    asked = scene(SPIN_UP, {"time": {"end": 8.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED})
+    fine = asked.replace({"time": {"end": 8.0, "tolerance": 1e-3, "output_step": 0.05}, "output.error": False})
     rest = ["centrifugal", "rotary_inertia"]
     true = distance(tip(rotfem.run(fine)), tip(rotfem.run(fine.replace({"model.effects": rest}))))
     assert true / 3 < rows_of(asked)["coriolis"]["estimate"][HISTORY] < 3 * true
@@ -451,20 +384,6 @@ def test_an_own_model_that_fails_is_reported() -> None:
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
     assert '"estimate"' in result.files()["explain.json"]
     result.drawings()["explain.png"]()
-
-
-def test_a_failing_eigenproblem_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: Any) -> None:
-        raise ComputationError("an eigenpair has the backward error 1, above 0")
-
-    monkeypatch.setattr(Pencil, "solve", fail)
-    result = rotfem.explain(scene(SPIN_UP))
-    rows = {row["name"]: row for row in result.rows}
-    assert np.isinf(rows["euler"]["estimate"][MODES])
-    assert "backward error" in rows["euler"]["notes"][MODES]
-    assert rows["euler"]["estimate"][HISTORY] == pytest.approx(1.0, abs=0.1)
-    assert any("modes of reissner cannot be computed" in text for text in result.summary["warnings"])
-    assert "speed_ratio" not in result.summary["groups"]
 
 
 def test_a_history_in_a_plane_is_explained_with_the_modes_of_all_unknowns() -> None:

@@ -99,19 +99,6 @@ def test_history_beyond_a_turn_is_the_planar_beams() -> None:
         np.testing.assert_allclose(spatial[other], planar[one], rtol=0, atol=1e-8 * np.max(np.abs(planar[one])))
 
 
-@pytest.mark.slow
-def test_a_resumed_run_counts_rotations_from_the_same_shapes(tmp_path: Path) -> None:
-    """A beam that a moment about a slanted axis winds up, resumed beyond a turn: histories agree to the last bit."""
-    tables = wound("spatial_beam") | {"loads": {"tip_moment": {"table": [[0, 0, 0, 0], [1, 0.5, 0, 12.0]]}}}
-    scene = Scene.from_dict(tables | {"mesh": {"elements": 4}, "time": {"end": 0.8, "step": 0.02}})
-    rotfem.run(scene.replace({"time.end": 0.74}), folder=tmp_path, checkpoint=1000)
-    resumed, whole = rotfem.run(scene, folder=tmp_path, resume=True), rotfem.run(scene)
-    theta = np.column_stack([whole.history[name] for name in THETA])
-    assert np.max(np.linalg.norm(theta[whole.t < 0.73], axis=1)) > 1.75 * np.pi
-    for name, values in whole.history.items():
-        np.testing.assert_array_equal(resumed.history[name], values, err_msg=name)
-
-
 # --- what a change of the reference leaves as it is -----------------------------------------------------------------
 
 
