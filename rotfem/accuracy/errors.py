@@ -231,7 +231,9 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list
         following = finer(own.setting)
         out.rows = [row(found.setting, apart.size, found.seconds), row(own.setting, error, own.seconds)]
         if other.factor > 1.0:
-            out.rows.append(row(following, error / (other.factor + 1.0), own.predicted(following), True))
+            growth = max(1.0, own.seconds / max(found.seconds, 1e-3))  # of no more than the work: one-off costs
+            seconds = min(own.seconds * growth, own.predicted(following))
+            out.rows.append(row(following, error / (other.factor + 1.0), seconds, True))
     return found
 
 
