@@ -18,7 +18,6 @@ from rotfem.registry import register
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
-    from rotfem.accuracy.cost import CostResult as CostResult
     from rotfem.analysis.schemes import ESDIRK4 as ESDIRK4
     from rotfem.analysis.schemes import GeneralisedAlpha as GeneralisedAlpha
     from rotfem.analysis.schemes import Newmark as Newmark
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from rotfem.analysis.schemes import State as State
     from rotfem.commands.campbell import campbell as campbell
     from rotfem.commands.check import check as check
+    from rotfem.commands.cost import CostResult as CostResult
     from rotfem.commands.cost import cost as cost
     from rotfem.commands.explain import explain as explain
     from rotfem.commands.import_blade import import_blade as import_blade

@@ -1,4 +1,4 @@
-"""What the commands print of their results, as lines of text; what only `cost` prints is in its package."""
+"""What the commands print of their results, as lines of text."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from rotfem.accuracy.errors import error_line, percent, table_lines
 from rotfem.results import Result
 from rotfem.results.columns import ShownUnits
 
+#: Rows of the table of `cost` that is printed in full.
+LONGEST_TABLE = 40
+
 
 def report(result: Result) -> list[str]:
     """Return the lines that the command prints of its result."""
-    own = getattr(result, "report", None)  # of `cost`
-    if own is not None:
-        lines: list[str] = own()
-        return lines
     s = result.summary
     tables = [line for table in result.tables() for line in table.lines()]
     before, after = _AROUND[s["command"]](s)
@@ -89,6 +88,30 @@ def called_for(found: dict[str, Any]) -> str:
     return out if found["seconds"] is None else out + "; {:.2g} s instead of {:.2g} s".format(*found["seconds"])
 
 
+def of_cost(s: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """Return what `cost` prints before and after its table."""
+    settings = f"{s['settings']} settings ({s['failed']} failed) in {s['timings']['total']:.1f} s"
+    front = "" if s["settings"] <= LONGEST_TABLE else "; all settings are in cost.csv"
+    after = []
+    if s["uncertainty"] is not None:
+        after.append(f"* no other setting is both cheaper and more accurate{front}")
+        after.append(f"reference: {s['reference']}, known to {percent(s['uncertainty'])}")
+    if refused := s["budget"]["refused"]:
+        after.append(f"{len(refused)} ladders ended for want of time: {refused[0]['why']}")
+    if (row := s["recommended"]) is not None:
+        after.append(f"for a relative accuracy of {s['accuracy']:g}: {row['words']}; {measured(row)}")
+    else:
+        after.append(f"no setting is known to be within {s['accuracy']:g} (relative)")
+    if (near := s["closest"]) is not None:
+        after.append(f"within {percent(near['within'])}: {near['row']['words']}; {measured(near['row'])}")
+    return [f"{s['name']}: error of {s['output']}, {settings}"], after
+
+
+def measured(row: dict[str, Any]) -> str:
+    """Return error and time of a row as text."""
+    return f"error {'≤ ' * row['at_most']}{percent(row['total_error'])}, {row['cost']:.3g} s of CPU time"
+
+
 def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `sweep` prints before and after its table."""
     keys = " × ".join(f"{key} ({len(values)})" for key, values in s["keys"].items())
@@ -105,6 +128,7 @@ _AROUND = {
     "campbell": of_campbell,
     "response": lambda s: ([about(s), f"{s['frequencies']} frequencies of the load"], []),
     "explain": of_explain,
+    "cost": of_cost,
     "compare": lambda s: ([], [f"largest difference: {percent(s['worst'])}"]),
     "sweep": of_sweep,
 }

@@ -7,8 +7,9 @@ Brown, "A correlation coefficient for modal vector analysis", Proc. 1st Int. Mod
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rotfem.errors import InputError
 from rotfem.results.columns import ShortTable, described, label, largest, number, per_cent
-from rotfem.results.distance import Series, relative
+from rotfem.results.distance import Series, alikeness, relative
 from rotfem.results.files import read_csv
 from rotfem.results.result import Result, Row, Rows
 from rotfem.results.result_set import read_summary
@@ -32,30 +33,6 @@ Values = npt.NDArray[Any]
 
 #: Commands whose results can be compared ↦ the file that is read.
 COMPARABLE = {"run": "history.csv", "modes": "modes.json", "campbell": "campbell.json", "response": "response.csv"}
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A quantity `y` over `x`: a column over time, a complex amplitude over frequency, a branch over speed."""
-
-    name: str
-    unit: str
-    x: Values
-    y: Values
-
-    @property
-    def vector(self) -> tuple[str, str]:
-        """Name of the vector that the quantity is a component of, and unit: what has one scale. A branch is its own."""
-        return self.name if self.unit == "rad/s" else self.name.rstrip("123"), self.unit
-
-    def beside(self, other: Curve) -> tuple[Values, Values, Values]:
-        """Return common places, and the values of this curve and of another one there (see `Series.beside`)."""
-        pair = (Series(one.x, one.y[:, None]) for one in (self, other))
-        here, there = next(pair).beside(next(pair))
-        if not len(here.times):
-            said = f"{self.x[0]:g} … {self.x[-1]:g} and {other.x[0]:g} … {other.x[-1]:g}"
-            raise InputError(self.name, said, "must overlap")
-        return here.times, here.values[:, 0], there.values[:, 0]
 
 
 class Compared:
@@ -78,23 +55,28 @@ class Compared:
         self.title = str(result.summary["name"] if isinstance(result, Result) else result)
 
     def _read(self, folder: Path) -> None:
-        self.summary, self.curves, self.modes = read_summary(folder), dict[str, Curve](), list[Row]()
+        self.summary, self.modes = read_summary(folder), list[Row]()
         self.command, status = (str(self.summary.get(key, "")) for key in ("command", "status"))
         if self.command not in COMPARABLE or status != "done":
             there = f"{self.command}, {status}" if self.command else "no results of rotfem"
             allowed = f"has {there}; must be a folder with finished results of {', '.join(COMPARABLE)}"
             raise InputError("compare", str(folder), allowed)
+        file = folder / COMPARABLE[self.command]
         try:
             if self.command in ("run", "response"):
-                curves = _curves(read_csv(folder / COMPARABLE[self.command]))
-            else:
-                found = json.loads((folder / COMPARABLE[self.command]).read_text(encoding="utf-8"))
-                self.modes, curves = found.get("modes", []), _branches(found.get("rows", []))
-            self.curves = {curve.name: curve for curve in curves}
-            if self.modes:
+                self.curves = dict(_columns(read_csv(file)))
+                return
+            found = json.loads(file.read_text(encoding="utf-8"))
+            self.curves = dict(_branches(found.get("rows", [])))
+            if self.command == "modes":
+                self.modes = found["modes"]
                 self.nodes, self.shapes = _shapes(read_csv(folder / "mode_shapes.csv"), len(self.modes))
         except (OSError, ValueError, LookupError) as error:
             raise InputError("compare", str(folder), f"its results cannot be read: {error}") from None
+
+    def of(self, name: str) -> tuple[str, str]:
+        """Return the vector that a curve is a component of, and its unit: what has one scale; a branch is its own."""
+        return (name, "rad/s") if self.command == "campbell" else (name.rstrip("123"), described(name)[1])
 
 
 @dataclass(repr=False)
@@ -146,15 +128,14 @@ def compare(*results: Result | str | Path) -> CompareResult:
         if other.command != reference.command:
             allowed = f"must be of {reference.command}, as {reference.title} is"
             raise InputError("compare", f"{other.title}: {other.command}", allowed)
-        pairs = _pairs(reference.curves, other.curves, by_name=reference.command != "campbell")
-        found, alone = [*_distances(pairs)], list[str]()
+        pairs = _pairs(reference, other)
+        found, alone = [*_distances(reference, other, pairs)], list[str]()
         if reference.command == "modes":
             found, alone = _modes(reference, other)
         if reference.command == "campbell":
-            found += _critical(reference, other, {(a.name, b.name) for a, b in pairs})
+            found += _critical(reference, other, pairs)
         rows += [{"result": other.title, **row} for row in found]
-        names = [{curve.name for curve in curves} for curves in zip(*pairs, strict=True)] or [set(), set()]
-        alone += sorted({*reference.curves} - names[0] | {*other.curves} - names[1])
+        alone += sorted({*reference.curves} - {one for one, _ in pairs} | {*other.curves} - {two for _, two in pairs})
         if alone:
             warnings.append(f"{other.title} and {reference.title}: only one of them has {', '.join(alone)}")
     summary = {
@@ -171,37 +152,44 @@ def compare(*results: Result | str | Path) -> CompareResult:
     return CompareResult(summary, rows, compared)
 
 
-def _pairs(a: Mapping[str, Curve], b: Mapping[str, Curve], by_name: bool) -> list[tuple[Curve, Curve]]:
-    """Return pairs of one name and, unless only these are wanted, of the others those of the nearest values."""
-    ones, others = list(a.values()), list(b.values())
+def _beside(name: str, one: Series, other: Series) -> tuple[Series, Series]:
+    """Return two curves at common places."""
+    here, there = one.beside(other)
+    if not len(here.times):
+        ends = (f"{curve.times[0]:g} … {curve.times[-1]:g}" for curve in (one, other))
+        raise InputError(name, " and ".join(ends), "must overlap")
+    return here, there
+
+
+def _pairs(a: Compared, b: Compared) -> list[tuple[str, str]]:
+    """Return the names of curves that belong together: equal ones, and of the other branches the nearest ones."""
+    pairs = [(name, name) for name in a.curves if name in b.curves]
+    if a.command != "campbell":
+        return pairs
+    ones, others = ([name for name in one.curves if (name, name) not in pairs] for one in (a, b))
     far = np.zeros((len(ones), len(others)))
-    for i, one in enumerate(ones):
-        for j, other in enumerate(others):
-            if by_name or one.name == other.name:
-                far[i, j] = one.name != other.name
-            else:
-                _, here, there = one.beside(other)
-                far[i, j] = 1.0 + relative(float(np.mean(np.abs(there - here))), float(np.max(one.y)))
-    pairs = [(ones[i], others[j]) for i, j in zip(*linear_sum_assignment(np.minimum(far, 9.0)), strict=True)]
-    return [(one, other) for one, other in pairs if not by_name or one.name == other.name]
+    for (i, one), (j, other) in product(enumerate(ones), enumerate(others)):
+        here, there = _beside(one, a.curves[one], b.curves[other])
+        far[i, j] = np.mean(np.abs(there.values - here.values))
+    return [*pairs, *((ones[i], others[j]) for i, j in zip(*linear_sum_assignment(far), strict=True))]
 
 
-def _distances(pairs: list[tuple[Curve, Curve]]) -> Iterator[Row]:
+def _distances(a: Compared, b: Compared, pairs: list[tuple[str, str]]) -> Iterator[Row]:
     """Yield a row for each pair of curves."""
+    parts = {name: _beside(name, a.curves[name], b.curves[other]) for name, other in pairs}
     scales: dict[tuple[str, str], float] = {}
-    parts = [(a, *a.beside(b)) for a, b in pairs]
-    for a, _, here, _ in parts:
-        scales[a.vector] = max(scales.get(a.vector, 0.0), float(np.max(np.abs(here))))
-    for a, x, here, there in parts:
-        off = np.abs(there - here)
+    for name, (here, _) in parts.items():
+        scales[a.of(name)] = max(scales.get(a.of(name), 0.0), here.scale)
+    for name, (here, there) in parts.items():
+        x, off = here.times, np.abs(there.values - here.values)[:, 0]
         rms = np.sqrt(np.trapezoid(off**2, x) / np.ptp(x)) if np.ptp(x) > 0.0 else off[-1]
         yield {
-            "quantity": a.name,
-            "unit": a.unit,
-            "reference": _peak(here),
-            "value": _peak(there),
-            "difference": relative(float(np.max(off)), scales[a.vector]),
-            "rms": relative(float(rms), scales[a.vector]),
+            "quantity": name,
+            "unit": a.of(name)[1],
+            "reference": _peak(here.values),
+            "value": _peak(there.values),
+            "difference": relative(float(np.max(off)), scales[a.of(name)]),
+            "rms": relative(float(rms), scales[a.of(name)]),
         }
 
 
@@ -211,31 +199,27 @@ def _modes(a: Compared, b: Compared) -> tuple[list[Row], list[str]]:
     Pairs are of like shapes, and among those of like frequencies. A rigid-body mode, which has no shape, is none of
     them with another mode.
     """
-    ones, others, rows = a.modes, b.modes, list[Row]()
-    alone = [[mode["label"] for mode in modes] for modes in (ones, others)]
-    mac, far = np.zeros((len(ones), len(others))), np.zeros((len(ones), len(others)))
-    for i, j in np.ndindex(far.shape):
-        u, v = a.shapes[i], b.shapes[j]
-        there = [name for name in u if name in v]
-        if there:
-            x = np.concatenate([u[name] for name in there])
-            y = np.concatenate([_moved(b.nodes, v[name], a.nodes) for name in there])
-            mac[i, j] = relative(float(np.abs(np.vdot(x, y)) ** 2), float(np.vdot(x, x).real * np.vdot(y, y).real))
-        here = ones[i]["frequency"]
-        far[i, j] = relative(abs(others[j]["frequency"] - here), here)
-    apart = np.not_equal.outer([bool(u) for u in a.shapes], [bool(v) for v in b.shapes])
+    here, there = (np.array([mode["frequency"] for mode in one.modes]) for one in (a, b))
+    far = np.abs(there - here[:, None]) / np.where(here > 0.0, here, np.inf)[:, None]
+    mac, names = np.zeros(far.shape), [name for name in a.shapes if name in b.shapes]
+    if names:
+        moved = [_moved(b.nodes, b.shapes[name], a.nodes) for name in names]
+        mac = alikeness(np.hstack([a.shapes[name] for name in names]), np.hstack(moved)) ** 2
+    rigid = [~np.any(np.hstack(list(one.shapes.values())), axis=1) for one in (a, b)]
+    apart = np.not_equal.outer(*rigid)
+    rows, alone = list[Row](), [[mode["label"] for mode in one.modes] for one in (a, b)]
     for i, j in zip(*linear_sum_assignment(np.minimum(far, 1.0) - mac + 2 * apart), strict=True):
-        if apart[i, j]:
-            continue
-        frequencies = {"reference": ones[i]["frequency"], "value": others[j]["frequency"]}
-        differences = {"difference": float(far[i, j]), "mac": float(mac[i, j])}
-        rows.append({"quantity": ones[i]["label"], "unit": "rad/s", **frequencies, **differences})
-        alone[0].remove(ones[i]["label"])
-        alone[1].remove(others[j]["label"])
+        if not apart[i, j]:
+            label = a.modes[i]["label"]
+            frequencies = {"reference": float(here[i]), "value": float(there[j])}
+            differences = {"difference": float(far[i, j]), "mac": float(mac[i, j])}
+            rows.append({"quantity": label, "unit": "rad/s", **frequencies, **differences})
+            alone[0].remove(label)
+            alone[1].remove(b.modes[j]["label"])
     return rows, [*alone[0], *alone[1]]
 
 
-def _critical(a: Compared, b: Compared, branches: set[tuple[str, str]]) -> Iterator[Row]:
+def _critical(a: Compared, b: Compared, branches: list[tuple[str, str]]) -> Iterator[Row]:
     """Yield a row for each critical speed that both have: of one kind and order, on branches that are paired."""
     there = list(b.summary["critical_speeds"])
     for one in a.summary["critical_speeds"]:
@@ -251,42 +235,44 @@ def _critical(a: Compared, b: Compared, branches: set[tuple[str, str]]) -> Itera
 
 
 def _moved(nodes: Values, values: Values, to: Values) -> Values:
-    """Return values at other nodes: along a beam by straight lines, of a plate those of the nearest node."""
+    """Return (modes, nodes) at other nodes: along a beam by straight lines, of a plate those of the nearest node."""
     if np.array_equal(nodes, to):
         return values
     if nodes.shape[1] == to.shape[1] == 1:
-        return np.asarray(np.interp(to[:, 0], nodes[:, 0], values))
-    return np.asarray(NearestNDInterpolator(nodes, values)(to))
+        return np.array([np.interp(to[:, 0], nodes[:, 0], mode) for mode in values])
+    return np.asarray(NearestNDInterpolator(nodes, values.T)(to)).T
 
 
 def _peak(y: Values) -> float:
     """Return the value of the largest amount; of amplitudes that itself."""
-    largest = y[np.argmax(np.abs(y))]
+    largest = y.flat[np.argmax(np.abs(y))]
     return float(np.abs(largest) if np.iscomplexobj(y) else largest)
 
 
-def _curves(columns: dict[str, Values]) -> Iterator[Curve]:
+def _columns(columns: dict[str, Values]) -> Iterator[tuple[str, Series]]:
     """Yield the columns of a history over time, or the complex amplitudes of a response over frequency."""
     x = columns.pop("t" if "t" in columns else "frequency")
     waves = {n: columns[n] * np.exp(1j * columns[f"{n}_phase"]) for n in columns if f"{n}_phase" in columns}
     for name, y in (waves or columns).items():
-        yield Curve(name, described(name)[1], x, y)
+        yield name, Series(x, y[:, None])
 
 
-def _branches(rows: list[Row]) -> Iterator[Curve]:
+def _branches(rows: list[Row]) -> Iterator[tuple[str, Series]]:
     for name in dict.fromkeys(row["label"] for row in rows):
         x, y = np.array(sorted((row["speed"], row["frequency"]) for row in rows if row["label"] == name)).T
-        yield Curve(name, "rad/s", x, y)
+        yield name, Series(x, y[:, None])
 
 
-def _shapes(columns: dict[str, Values], count: int) -> tuple[Values, list[dict[str, Values]]]:
-    """Return nodes and, for each mode, its complex components; a rigid-body mode comes first and has none."""
-    nodes = np.stack([columns[name] for name in ("x", "y") if name in columns] or [np.ones(1)], axis=-1)
-    shapes: list[dict[str, Values]] = []
-    for i in range(1, count + 1):
-        names = [n.removesuffix(f"_imag_{i}") for n in columns if n.endswith(f"_imag_{i}")]
-        shapes.append({n: columns[f"{n}_{i}"] + 1j * columns[f"{n}_imag_{i}"] for n in names})
-    return nodes / np.max(np.abs(nodes)), [{}] * sum(not s for s in shapes) + [s for s in shapes if s]
+def _shapes(columns: dict[str, Values], count: int) -> tuple[Values, dict[str, Values]]:
+    """Return nodes and component ↦ complex shapes (modes, nodes); a rigid-body mode comes first, with zeros."""
+    nodes = np.stack([columns[name] for name in ("x", "y") if name in columns], axis=-1)
+    shapes: dict[str, Values] = {}
+    for i, name in product(range(count), dict.fromkeys(n.partition("_imag_")[0] for n in columns if "_imag_" in n)):
+        mode = shapes.setdefault(name, np.zeros((count, len(nodes)), dtype=complex))[i]
+        if f"{name}_{i + 1}" in columns:
+            mode[:] = columns[f"{name}_{i + 1}"] + 1j * columns[f"{name}_imag_{i + 1}"]
+    order = np.argsort(np.any(np.hstack(list(shapes.values())), axis=1), kind="stable")
+    return nodes / np.max(np.abs(nodes)), {name: values[order] for name, values in shapes.items()}
 
 
 def compare_figure(result: CompareResult) -> Figure:
@@ -301,9 +287,10 @@ def compare_figure(result: CompareResult) -> Figure:
     axes = figure.subplots(max(len(names), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axis, name in zip(axes, names or ["frequency"], strict=True):
         for k, one in enumerate(result.compared):
-            for curve in (c for c in one.curves.values() if c.name == name or not names):
-                values, mark = np.abs(curve.y) if command == "response" else curve.y, "." * (len(curve.x) == 1)
-                axis.plot(curve.x, values, f"C{k}{mark}{'--' if k else '-'}", lw=1.3, label=one.title)
+            for curve in (c for n, c in one.curves.items() if n == name or not names):
+                values = np.abs(curve.values) if command == "response" else curve.values
+                mark = "." * (len(curve.times) == 1)
+                axis.plot(curve.times, values, f"C{k}{mark}{'--' if k else '-'}", lw=1.3, label=one.title)
         dress(axis, y=label(name), size=None)
         axis.set_yscale("log" if command == "response" else "linear")
     axes[-1].set_xlabel(label({"campbell": "psi_dot", "response": "frequency"}.get(command, "t")))

@@ -23,7 +23,7 @@ class Distance:
     Attributes:
         size: largest difference, relative to the largest value (of eigenvalues, to each); infinite if that is 0.
         at: time of the largest difference, s; None of what has no time.
-        each: of every component, or of every eigenvalue, relative to its own size.
+        each: of every eigenvalue, relative to its own size.
     """
 
     size: float
@@ -83,9 +83,7 @@ class Series:
         change = self.difference(other)
         off = np.linalg.norm(change.values, axis=-1)
         largest = float(off.max(initial=0.0)) if np.all(np.isfinite(off)) else np.inf
-        pairs = zip(*(np.abs(x).max(axis=0, initial=0.0) for x in (change.values, self.values)), strict=True)
-        at = float(change.times[np.argmax(off)]) if len(off) else None
-        return Distance(relative(largest, self.scale), at, np.array([relative(x, size) for x, size in pairs]))
+        return Distance(relative(largest, self.scale), float(change.times[np.argmax(off)]) if len(off) else None)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.accuracy.cost import ERRORS, pareto, recommend
 from rotfem.accuracy.tuned import write_variant
 from rotfem.commands.advice import advise
+from rotfem.commands.cost import ERRORS, pareto, recommend
 from rotfem.errors import SceneError
 from rotfem.results.distance import Series, Spectrum
 from rotfem.results.result import Row

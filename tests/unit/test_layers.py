@@ -160,7 +160,6 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
         "rotfem.scene",
         "rotfem.results",
         "rotfem.results.plots",
-        "rotfem.accuracy.cost",
         "rotfem.commands.cli",
     ],
 )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 import rotfem
-from rotfem.accuracy.cost import CostResult, changes_of
+from rotfem.commands.cost import CostResult, changes_of
 from rotfem.errors import Stopped
 
 from .conftest import SPIN_UP, reference_file
@@ -118,7 +118,7 @@ def test_a_theory_that_diverges_is_a_failed_point() -> None:
 
 
 def test_a_budget_that_is_too_small_is_said() -> None:
-    result = rotfem.cost(SHORT, accuracy=1e-8, budget=1.0, theories=["reissner"])
+    result = rotfem.cost(SHORT, accuracy=1e-12, budget=1.0, theories=["reissner"])
     assert result.summary["budget"]["refused"]
     assert result.summary["recommended"] is None
     assert result.rows
