@@ -6,6 +6,7 @@ A run is the compiled system, what yields its states, the observers that see the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -345,17 +346,15 @@ def run(
     """
     scene = as_scene(scene)
     every = None if checkpoint is None else interval(checkpoint)
-    if folder is None:
-        return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs, parts=parts)
-    with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
+    with nullcontext() if folder is None else ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
+        store = RunStore(comm, results, every, resume)
         try:
-            done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
+            done = simulate(scene, store, progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
-            if error.result is not None:
+            if results is not None and error.result is not None:
                 error.result.write_into(results)
             raise
-        problems = done.write_into(results)
-        if problems:
+        if results is not None and (problems := done.write_into(results)):
             raise problems[0]
         return done
 
