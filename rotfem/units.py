@@ -18,6 +18,8 @@ _NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 #: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
 _NAMED = r"(?:[^\W\d]\w*|°|%)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_NAMED}(?:\s*[*/·\s]\s*{_NAMED})*)\s*")
+#: Numbers, and the unit at the end of them all.
+_NUMBERS = re.compile(r"\s*([-+0-9.eE:,\s]*[\d.])\s*([^\W\d].*?)?\s*")
 
 
 def is_quantity(text: str) -> bool:
@@ -35,8 +37,8 @@ def quantity(text: str, unit: str) -> float:
 
 def unit_of(text: str) -> str:
     """Return the unit at the end of a text such as "12.1 rpm" or "0:15:31rpm"; empty where there is none."""
-    found = re.fullmatch(r"[-+0-9.eE:,\s]*\d\.?\s*((?![eE][-+]?\d)[^\W\d].*?)\s*", text)
-    return found[1] if found else ""
+    found = _NUMBERS.fullmatch(text)
+    return found[2] or "" if found else ""
 
 
 def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
@@ -54,7 +56,7 @@ def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
 
 def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
     """Return the numbers of a text without the unit that ends it, and that unit in the wanted one; 1 without."""
-    found = re.fullmatch(r"\s*([-+0-9.eE:,\s]*[\d.])\s*([^\W\d].*)?", text)
+    found = _NUMBERS.fullmatch(text)
     if found is None:
         raise ValueError("must be numbers, with a unit at the end of them all or without")
     return found[1], quantity(f"1 {found[2]}", unit) if found[2] else 1.0

@@ -33,10 +33,7 @@ def iec_matrices(station: dict[str, Any], angle: float) -> tuple[Array, Array]:
     Sums of forces and momenta at each centre, as they are for x, y, z: not the program's formulas, nor its axes.
     """
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    edge, flap = (
-        np.array([s, -c, 0.0]),
-        np.array([c, s, 0.0]),
-    )  # principal axes 2 and 3: to the leading edge, downwind
+    edge, flap = np.array([s, -c, 0.0]), np.array([c, s, 0.0])  # principal axes 2 and 3: to the leading edge, downwind
     along = np.array([0.0, 0.0, 1.0])
 
     def motion_at(point: tuple[float, float], direction: Array) -> Array:
@@ -152,21 +149,8 @@ def bmodes() -> str:
     for x, twist, s in zip((0.0, 1.0), TWIST, STATIONS, strict=True):
         cg, tc, sc = s["cg"][0], s["ec"][0], s["sc"][0]
         edge = s["EI3"] + s["EA"] * (tc - sc) ** 2
-        values = [
-            x,
-            twist,
-            twist,
-            s["m"],
-            s["J2"],
-            s["J3"] + s["m"] * cg**2,
-            s["EI2"],
-            edge,
-            s["GJ"],
-            s["EA"],
-            cg,
-            sc,
-            tc,
-        ]
+        inertias = [s["J2"], s["J3"] + s["m"] * cg**2]
+        values = [x, twist, twist, s["m"], *inertias, s["EI2"], edge, s["GJ"], s["EA"], cg, sc, tc]
         rows.append("  ".join(f"{value:.12e}" for value in values))
     names = (
         "str_tw tw_iner mass_den flp_iner edge_iner flp_stff edge_stff tor_stff axial_stff cg_offst sc_offst tc_offst"

@@ -123,8 +123,8 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
     return out
 
 
-def assign(point: SpeedPoint, following: SpeedPoint) -> float:
-    """Join the branches of a point with the columns of the following one; return the least squared correlation.
+def assign(point: SpeedPoint, following: SpeedPoint) -> None:
+    """Join the branches of a point with the columns of the following one.
 
     A branch whose best partner is a stranger has the order −1 from there on.
     """
@@ -153,7 +153,6 @@ def assign(point: SpeedPoint, following: SpeedPoint) -> float:
     following.confidence[known[rows]] = c[rows, columns]
     kin = c[rows, columns] >= 0.02  # else they have nothing in common, and the branch is lost
     following.order[known[rows[kin]]] = columns[kin]
-    return float(np.min(c[rows, columns], initial=1.0))
 
 
 def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:

@@ -94,7 +94,7 @@ def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
 
 @cache
 def _coefficients(known: int) -> tuple[Array, Array]:
-    """Return the coefficients, by power, of the polynomials that are 1 in one datum of two ends and 0 in the others.
+    """Return the coefficients, by power, of the polynomials that are 1 in one value of two ends and 0 in the others.
 
     With them come their second derivatives at both ends.
     """

@@ -51,8 +51,7 @@ def steady_state(
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
     Speed and loads are raised together (on hinges the loads at the full speed), in one step where Newton allows and in
-    smaller ones where not; the state is left in the system's functions. Where that ends at no minimum of the energy, or
-    not at all, the path of equilibria is followed (`rotfem.analysis.equilibrium`): Newton may have left it.
+    smaller ones where not; the state is left in the system's functions.
 
     Args:
         system: equations of motion.
@@ -428,8 +427,8 @@ def limited(
 # --- round-off of the stiffness ---------------------------------------------------------------------------------------
 
 
-class Farthest:
-    """Remembers the largest state of a motion of a linear theory.
+class LargestState:
+    """The largest state of a motion of a linear theory, by which the effect of round-off is judged.
 
     Args:
         system: equations of motion.
@@ -459,7 +458,7 @@ class Farthest:
         state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time
         system.set_time(t)
         try:
-            return said_of(conditioning(system, q[: len(state[0])], t or np.inf))
+            return rounding_message(conditioning(system, q[: len(state[0])], t or np.inf))
         except ComputationError:
             return ""
         finally:
@@ -484,7 +483,7 @@ def rounded_compliance(system: System, K: Any, q: Array) -> float:
     return float(RoundOff(pencil).stiffness(X, X)[0]) / work if work > 0.0 else 0.0
 
 
-def said_of(bound: float) -> str:
+def rounding_message(bound: float) -> str:
     """Return a warning of an error bound; empty of one that is small."""
     if not bound > ROUNDED_OFF:
         return ""

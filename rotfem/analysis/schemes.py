@@ -31,7 +31,7 @@ stages of steps of one length share one tangent.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -167,6 +167,10 @@ class Equations(Protocol):
         """Return −F at a stage, zero at clamped unknowns; the owned part, of a free hub with that of its angle last."""
 
 
+#: What sees a step, or a part of one, of a march, from an old to a new state.
+Observer = Callable[[State, State], None]
+
+
 def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
     """Return the divided difference of values at distinct points: the derivative of order n − 1 over (n − 1)!."""
     return np.asarray(_difference_weights(*points) @ np.array(values))
@@ -247,13 +251,6 @@ class Scheme(ABC):
     def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
         """Return name ↦ what is allowed, for every parameter whose value (a finite number) is not."""
         return {}
-
-
-class Observer(Protocol):
-    """An observer of the steps of a march."""
-
-    def __call__(self, old: State, new: State) -> None:
-        """Observe a step, or a part of one, from an old to a new state."""
 
 
 # --- of second order --------------------------------------------------------------------------------------------------

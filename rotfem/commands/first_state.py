@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
+from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.stability import Stability, constant_stability, stability_of
-from rotfem.commands.problem import first_motion
 from rotfem.equations.compiled import compile_system, with_all_unknowns
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
@@ -52,7 +52,9 @@ def first_state(scene: Scene, problem: Problem, system: System, judged: bool = T
             start.warnings.append(f"what constant conditions hold in balance: {said}")
     if initial.tip_displacement is not None:
         start.q = static_tip_shape(problem, initial.tip_displacement, newton, system.comm)
-    if (motion := first_motion(scene)) is not None:
+    if initial.moves:
+        mode, amplitude, velocity = initial.mode, initial.amplitude or 0.0, initial.velocity
+        motion = FirstMotion(mode=mode, amplitude=amplitude, phase=initial.phase, velocity=velocity)
         analysis = ModalAnalysis(problem, initial.state, comm=system.comm, system=system)
         start.q, start.v = motion.about(start.q, analysis, newton)
     return start

@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.equilibrium import check_steady, steady_state
-from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
@@ -291,14 +290,6 @@ class Problem(ProblemData):
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")
 
 
-def first_motion(scene: Scene) -> FirstMotion | None:
-    """Return the initial motion of a scene; None if it starts at rest."""
-    said = scene.initial
-    if not said.moves:
-        return None
-    return FirstMotion(mode=said.mode, amplitude=said.amplitude or 0.0, phase=said.phase, velocity=said.velocity)
-
-
 def scheme_of(time: Time) -> Scheme:
     """Return the scheme that a scene's [time] table asks for."""
     return cast(Scheme, Scheme.registry[time.scheme](**time.parameters))
@@ -358,7 +349,11 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
         key = "structure.root.pitch"
         rate = given.rate and number_of(given.rate, f"{key}.rate", "time")
         parts.append(differentiated(number_of(given.function, key, "time"), rate, cell_of(scene.time)))
-    angle, rate, acceleration = (_sum([part[i] for part in parts]) for i in range(3))
+
+    def summed(i: int) -> Scalar:
+        return lambda t: sum(part[i](t) for part in parts)
+
+    angle, rate, acceleration = map(summed, range(3))
     axis, root = np.array(structure.root_axis), np.array(structure.root_position)
     known = given.function is None and not given.harmonic
     return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
@@ -381,7 +376,3 @@ def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
         return (lambda t: omega * t), (lambda t: omega), (lambda t: 0.0)
     n = harmonic.per_rev
     return (lambda t: n * motion.angle(t)), (lambda t: n * motion.speed(t)), (lambda t: n * motion.rate(t))
-
-
-def _sum(parts: list[Scalar]) -> Scalar:
-    return lambda t: sum(part(t) for part in parts)

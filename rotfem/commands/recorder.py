@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.dense_output import write_state
-from rotfem.analysis.equilibrium import Farthest
+from rotfem.analysis.equilibrium import LargestState
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
@@ -71,7 +71,7 @@ class Monitor:
     def __init__(self, system: System, critical: float | None):
         self.system, self.critical = system, critical
         self.since: float | None = None
-        self.farthest = Farthest(system)
+        self.farthest = LargestState(system)
         self.stability: Stability | None = None
 
     def step(self, state: State) -> None:

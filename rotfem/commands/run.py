@@ -6,6 +6,7 @@ A run is the compiled system, what yields its states, the observers that see the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -24,7 +25,7 @@ from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, error_of, to_accuracy, with_error
+from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, to_accuracy, with_error
 from rotfem.commands.explain import needed_model
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
@@ -345,17 +346,15 @@ def run(
     """
     scene = as_scene(scene)
     every = None if checkpoint is None else interval(checkpoint)
-    if folder is None:
-        return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs, parts=parts)
-    with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
+    with nullcontext() if folder is None else ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
+        store = RunStore(comm, results, every, resume)
         try:
-            done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs, parts=parts)
+            done = simulate(scene, store, progress, hint, terms, outputs, parts=parts)
         except (ComputationError, Stopped) as error:
-            if error.result is not None:
+            if results is not None and error.result is not None:
                 error.result.write_into(results)
             raise
-        problems = done.write_into(results)
-        if problems:
+        if results is not None and (problems := done.write_into(results)):
             raise problems[0]
         return done
 
@@ -412,8 +411,7 @@ def simulate(
         own = Answer(replace(Setting.of(scene), degree=degree), simulation, log.cpu + computing() - log.began)
         answers.keep(own)
         shown(result)
-        started = perf_counter()
-        return with_error(result, error_of(answers, own, comm, parts), own, scene, started)
+        return with_error(result, answers, own, comm, parts)
 
 
 #: Rows of a history that does not say it.

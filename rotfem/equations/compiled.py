@@ -34,8 +34,8 @@ def compile_system(
 ) -> System:
     """Return the system of a problem.
 
-    A system that is not `moving`, of steady states and modes, needs fewer forms; `parted` shares forms between the
-    nonlinear theories (see `NonlinearSystem`).
+    A system that is not `moving`, of steady states and modes, needs fewer forms; effects can be left out of one that is
+    `parted`, or moving.
     """
     view = View()
     seen, signals = viewed(problem, view) if moving else (problem, [])

@@ -71,7 +71,6 @@ class HubRow:
     Args:
         model: the terms, with a free hub.
         clamped: numbers of the clamped unknowns.
-        once: whether its forms are compiled without optimisation (see `rotfem.numerics.forms`).
 
     Attributes:
         angle: psi and its rates, and the motion of the frame that they make.
@@ -80,7 +79,7 @@ class HubRow:
         has_outside: whether there are external forces.
     """
 
-    def __init__(self, model: Model, clamped: Any, once: bool):
+    def __init__(self, model: Model, clamped: Any):
         assert model.hub is not None
         self.model, self.angle, self.hub, self._clamped = model, model.hub, model.hub.hub, clamped
         self.coupled = "hub_coupling" in model.effects
@@ -101,7 +100,7 @@ class HubRow:
             return {name: form for name, form in wanted.items() if form is not None}
 
         purpose, more = f"hub {model.motion.axis} {model.effects}", (*self._shifts, *self._by_spin.constants)
-        self._forms = model.derived_forms(purpose, make, more, once)[1]
+        self._forms = model.derived_forms(purpose, make, more, once=False)[1]
         self.has_outside, self._momentum = "outside" in self._forms, None
         self._vector = compat.create_vector(model.structure.V)
 

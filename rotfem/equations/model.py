@@ -191,7 +191,7 @@ class Model:
         """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
 
         Args:
-            purpose: what beside the residual they depend on.
+            purpose: what they depend on in addition to the residual.
             make: name ↦ UFL form.
             more: constants and functions in them that are not in the residual.
             once: see `rotfem.numerics.forms.form`.
@@ -212,12 +212,6 @@ class Model:
             if len(_KNOWN) > 32:
                 del _KNOWN[next(iter(_KNOWN))]
         return {name: forms.constants_of(f) for name, f in derived.items()}, compiled
-
-    def by_strains(self) -> list[Any]:
-        """Return the residual in two parts, the first with all terms that have strains; UFL forms."""
-        within = [term for name, term in self.terms.items() if self.acting[name].internal]
-        rest = [term for name, term in self.terms.items() if not self.acting[name].internal]
-        return [added(part) for part in (within, rest) if part]
 
     @cached_property
     def turn(self) -> RigidTurn:

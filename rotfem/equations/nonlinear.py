@@ -93,8 +93,6 @@ class NonlinearSystem(System):
     Args:
         model: the terms.
         moving: see `System`.
-        parted: whether terms with strains are compiled by themselves in a history. The rest, inertia and loads, is most
-            of the compilation, and shared with other theories.
 
     Attributes:
         signs: −1 of every local unknown, 0 where it is clamped.
@@ -109,12 +107,7 @@ class NonlinearSystem(System):
         self._shift_entries = [constant.value for constant in self._shifts]  # where they are
         self.signs = np.full_like(self._b_array, -1.0)
         self.signs[self.clamped] = 0.0
-        if self.moving and self.parted:
-            parts, once = self.model.by_strains(), self.structure.planar
-            self._F = [forms.form(F, once) for F in parts]
-            self._J = [forms.form(self._tangent_of(F), once) for F in parts]
-            self._pattern = self._J[0]
-        elif self.moving:
+        if self.moving:
             made = self.model.derived_forms("moving", self._made_moving, tuple(self._shifts), once=False)[1]
             self._F, self._J = [made["F"]], [made["J"]]
             self._pattern = self._J[0]
@@ -129,11 +122,8 @@ class NonlinearSystem(System):
 
     @per_composition
     def _tangent_form(self) -> Any:
-        return self._tangent_of(self.model.residual)
-
-    def _tangent_of(self, F: Any) -> Any:
         du = ufl.TrialFunction(self.V)
-        parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
+        parts = (ufl.derivative(self.model.residual, x, du) for x in (self.q, self.v, self.a))
         return weighted(self._shifts, parts)
 
     # --- over a whole step -------------------------------------------------------------------------------------------

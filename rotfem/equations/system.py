@@ -71,7 +71,7 @@ class System(ABC):
         model: the terms.
         moving: whether velocities and accelerations will be set, as in a history. A system that is not moving has
             forms of its own at v = a = 0, which compile in a fraction of the time.
-        parted: see `rotfem.equations.compiled`.
+        parted: whether effects can be left out at rest too, as in comparisons of models.
         view, signals: see below.
 
     Attributes:
@@ -143,7 +143,7 @@ class System(ABC):
         self.assembler = self._compile()
         self.A, self.compositions = self.assembler.pattern, self.model.compositions
         if self.hub is not None:
-            self.row = HubRow(self.model, self.clamped, once=self.parted and self.structure.planar)
+            self.row = HubRow(self.model, self.clamped)
             self.row.coupled &= "hub_coupling" not in self.left_out
 
     def count_rotations_from(self, reference: ReferenceRotation | None) -> None:

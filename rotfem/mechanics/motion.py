@@ -82,7 +82,7 @@ class Motion:
         is_accelerated: whether a_o is anything but zero.
         knots: times (s) between which Omega is smooth and nearly a polynomial.
         sharp: those of them at which a derivative of it may jump.
-        breakpoints: of a function, those that its user named; None if it has to be looked for them.
+        breakpoints: of a function, those that its user named; None if they are searched.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
         base_knots: times (s) between which a_o is linear; None if that is not known.

@@ -1,4 +1,4 @@
-"""Pitch over time: the frame of a blade turns about the blade's axis at the root, beside the turn of the hub.
+"""Pitch over time: the frame of a blade turns about the blade's axis at the root, in addition to the turn of the hub.
 
 The pitched frame turns with the blade and coincides with that of the hub at t = 0, where the blade has its first pitch
 already. With the pitch θ(t), φ = θ − θ(0), the axis e and the rotation R = exp(φ e), vectors of the hub's frame have
@@ -108,7 +108,7 @@ class Pitch:
     def moved(self, turn: tuple[Any, Any, Any], w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
         """Return the motion of the pitched frame: w, dw, a_o and v_o, the velocity of its origin, its components.
 
-        Beside it "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s). Of many times at once all have one more
+        With them "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s). Of many times at once all have one more
         dimension, which comes first.
         """
         phi, rate, acceleration = (np.asarray(x)[..., None] for x in turn)

@@ -1,6 +1,6 @@
 """Where compiled forms are kept, and the options they are compiled with.
 
-A library is code that is loaded, so its folder is the user's, and nobody else can write to it. dolfinx and FFCx read
+A library is code that is loaded, so only the user can write to its folder. dolfinx and FFCx read
 options from files of the working folder too. Those that are passed win over them, so all are passed here.
 """
 

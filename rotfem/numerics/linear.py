@@ -29,7 +29,7 @@ MIDDLE = 1000
 #: Units of round-off in an entry of an assembled matrix, in those of √(K_ii K_jj): sums over quadrature points.
 ROUNDED = 2 * float(np.finfo(np.float64).eps)
 
-#: What is said of a singular matrix.
+#: Message of a singular matrix.
 SINGULAR = "the tangent is singular: the factorisation met a zero pivot"
 
 
@@ -240,7 +240,7 @@ def negative_count(K: Any, sure: bool = False) -> int | None:
 
 
 class SingularSolver:
-    """Solver of A x = b with a singular A and a small K beside it; what A does not feel, A n = 0, follows: n·K x = 0.
+    """Solver of A x = b with a singular A and a small K; what A does not feel, A n = 0, follows: n·K x = 0.
 
     x = (A + K)⁻¹ A (A + K)⁻¹ b, so that round-off of b in these directions, large over a small K, is in no x.
 

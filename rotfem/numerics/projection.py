@@ -136,10 +136,10 @@ class Sendable:
     comm: MPI.Comm
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name not in ("comm", "owner")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("comm", "owner")}
 
     def __setstate__(self, known: dict[str, Any]) -> None:
-        vars(self).update(known, comm=MPI.COMM_SELF, owner=None)
+        self.__dict__ |= known | {"comm": MPI.COMM_SELF, "owner": None}
 
 
 class LowRank(Sendable):

@@ -185,7 +185,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
 
 
 def _load(gmsh: Any, path: Path) -> None:
-    """Start gmsh, and load the file under another name: a script "<name>.opt" beside what it reads would be run."""
+    """Start gmsh, and load the file under another name: a script "<name>.opt" next to what it reads would be run."""
     gmsh.initialize([], False, False, False)
     gmsh.option.setNumber("General.Terminal", 0)
     with TemporaryDirectory(prefix="rotfem-") as folder:

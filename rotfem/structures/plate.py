@@ -127,7 +127,7 @@ class Plate(Structure):
         comm: communicator the mesh is distributed over.
 
     Raises:
-        InputError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it, more processes
+        InputError: a mesh file that is no mesh of a plate, elements that lock on it, masses off it, more processes
             than the mesh can be shared by.
     """
 

@@ -126,7 +126,7 @@ class Turns:
             mesh, degree = self._structure.mesh, self._space.element.basix_element.degree
             vectors = fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3,)))
             self.rotation = fem.Function(self._space, name="reference")
-            self.curvature = fem.Function(vectors, name="datum_curvature")
+            self.curvature = fem.Function(vectors, name="reference_curvature")
             self.before = fem.Function(self._structure.V, name="before")
         self.reference = reference
         shape = reference or self._undeformed

@@ -101,7 +101,7 @@ class SectionTurn(Turn):
 
 @dataclass(frozen=True, kw_only=True)
 class SectionBody(Body):
-    """What is fixed in a section: a director Λ d, seen along the turned axes, or a mass at r + Λ d beside the axis.
+    """What is fixed in a section: a director Λ d, seen along the turned axes, or a mass at r + Λ d off the axis.
 
     Attributes:
         arm: d, what the director or the offset is in the undeformed beam.

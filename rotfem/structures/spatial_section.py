@@ -33,7 +33,7 @@ def stretch_by_twist(radius_squared: Any, twist: Any, pretwist: Any, warping: An
     beam with the pretwist k⁰ = dφ/dX, whose fibers are helices at rest, ½ r² [(k⁰ + K₁)² − k⁰²], less what the warping
     of the section takes of them (Krenk, Int. J. Solids Struct. 19 (1983) 67): nothing is left of it in a circle, all of
     it in a thin strip. The axis of twist is that of the shear centers. What twist makes of the strains over the section
-    beside their mean, a stiffness of fourth order in the width, is left out.
+    other than their mean, a stiffness of fourth order in the width, is left out.
     """
     first = 0 if isinstance(pretwist, int) else pretwist * (radius_squared - warping) * twist
     return Gain(first, radius_squared * twist**2 / 2)
@@ -70,7 +70,7 @@ NEGLIGIBLE = 1e-12
 
 
 def moving_moments(masses: Array) -> tuple[list[tuple[int, int]], bool]:
-    """Return (pairs (i, j) of entries of ∫ x xᵀ dm about the mass centre, whether this lies beside the section).
+    """Return (pairs (i, j) of entries of ∫ x xᵀ dm about the mass centre, whether this lies off the section).
 
     An entry is left out where it vanishes in all mass matrices (n, 6, 6). Those on the diagonal come first.
     """

@@ -53,39 +53,14 @@ step = 0.01
 Run = Callable[..., Done]
 
 
-def changed(old: str, new: str) -> str:
-    assert SCENE.count(old) == 1
-    return SCENE.replace(old, new)
-
-
-#: What is wrong ↦ (text of the scene, further arguments, what the message must contain, in this order).
-BAD: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
-    "wrong key": (changed("duration", "durations"), (), ("motion.durations", "unknown key", "duration", "allowed")),
-    "NaN": (changed("EI = 1.4e4", "EI = nan"), (), ("structure.section.EI", "nan", "finite")),
-    "unreadable TOML": (changed("[time]", "[time"), (), ("not valid TOML", "line 24")),
-    "impossible combination": (
-        SCENE,
-        ("--set", "model.frame=inertial", "--set", "model.theory=linear"),
-        ("model.frame", '"inertial"', '"reissner"'),
-    ),
-}
-
-
-@pytest.mark.parametrize("what", list(BAD))
-def test_bad_scenes(rotfem: Run, folder: Path, what: str) -> None:
-    text, arguments, words = BAD[what]
-    (folder / "beam.toml").write_text(text)
-    before = sorted(os.listdir(folder))
-    done = rotfem("run", "beam.toml", *arguments)
-    assert done.status == 2
-    assert done.out == ""
-    assert sorted(os.listdir(folder)) == before
+def test_a_bad_scene(rotfem: Run, folder: Path) -> None:
+    """File, key, what is wrong and what is allowed in one message, and nothing on disk."""
+    (folder / "beam.toml").write_text(SCENE.replace("duration", "durations"))
+    done = rotfem("run", "beam.toml")
+    assert (done.status, done.out) == (2, "")
+    assert os.listdir(folder) == ["beam.toml"]
+    assert done.err.startswith('rotfem: beam.toml: motion.durations: unknown key; did you mean "duration"? allowed: ')
     assert "Traceback" not in done.err
-    assert done.err.startswith("rotfem: beam.toml: ")
-    rest = done.err
-    for word in words:
-        assert word in rest, f"{word!r} is not in {rest!r}, the rest of {done.err!r}"
-        rest = rest.split(word, 1)[1]
 
 
 def test_each_verb_has_a_folder_of_its_own(rotfem: Run, folder: Path) -> None:

@@ -19,7 +19,6 @@ from rotfem.commands.problem import motion_of
 from rotfem.errors import Fault, SceneError
 from rotfem.scene import (
     PlanarBeamStructure,
-    PlateMesh,
     PlateStructure,
     Scene,
     SpatialBeamStructure,
@@ -90,15 +89,6 @@ def test_example_scenes_are_valid_and_survive_a_round_trip(name: str) -> None:
 
 
 # --- defaults and normal forms --------------------------------------------------------------------------------------
-
-
-def test_time_parameters_belong_to_the_scheme() -> None:
-    alpha = scene(time={"end": 1, "step": 0.1}).time
-    assert alpha is not None
-    assert (alpha.scheme, alpha.parameters) == ("generalised_alpha", {"spectral_radius": 0.9})
-    newmark = scene(time={"end": 1, "step": 0.1, "scheme": "newmark"}).time
-    assert newmark is not None
-    assert newmark.parameters == {"beta": 0.25, "gamma": 0.5}
 
 
 def test_plate_elements_may_be_one_number() -> None:
@@ -397,12 +387,3 @@ def test_cells_by_the_aspect_ratio_of_a_plate(length: float, width: float, eleme
     given = scene("plate", structure__length=length, structure__width=width, mesh__elements=[3, 5])
     assert given.mesh.elements == (3, 5)
     assert given.replace({"structure.length": 7 * width}).mesh.elements == (3, 5)
-
-
-def test_cells_of_a_plate_in_a_script() -> None:
-    """A problem chooses them too, and anew for another structure."""
-    plate = PlateStructure(length=1000.0, width=1.0, thickness=0.01, E=7e10, nu=0.3, rho=2700.0)
-    problem = rotfem.Problem(structure=plate, motion=rotfem.Motion.constant_speed(0.0), mesh=PlateMesh())
-    assert problem.mesh.elements == (32, 2)
-    square = problem.replace(structure=plate.model_copy(update={"length": 1.0}))
-    assert square.mesh.elements == (8, 8)
