@@ -46,8 +46,8 @@ FINEST, MOST_STEPS = 1e-5, 200
 #: solve, and the last step of Newton's method: its error is about the square, 1e-7. Solutions for a zero, usually one.
 ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
 
-#: Least distance of a node of a model from others, in parts of that of two speeds: its reciprocal is about what round-off
-#: of the matrices is multiplied by.
+#: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
+#: multiplied by about its reciprocal.
 NODES_APART = 1e-4
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
