@@ -46,6 +46,10 @@ FINEST, MOST_STEPS = 1e-5, 200
 #: solve, and the last step of Newton's method: its error is about the square, 1e-7. Solutions for a zero, usually one.
 ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
 
+#: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
+#: multiplied by about its reciprocal.
+NODES_APART = 1e-4
+
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
 
@@ -112,8 +116,8 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
 
 
-def assign(point: SpeedPoint, following: SpeedPoint) -> float:
-    """Join the branches of a point with the columns of the following one; return the least squared correlation.
+def assign(point: SpeedPoint, following: SpeedPoint) -> None:
+    """Join the branches of a point with the columns of the following one.
 
     A branch whose best partner is a stranger has the order −1 from there on.
     """
@@ -142,7 +146,6 @@ def assign(point: SpeedPoint, following: SpeedPoint) -> float:
     following.confidence[known[rows]] = c[rows, columns]
     kin = c[rows, columns] >= 0.02  # else they have nothing in common, and the branch is lost
     following.order[known[rows[kin]]] = columns[kin]
-    return float(np.min(c[rows, columns], initial=1.0))
 
 
 def swapped(a: SpeedPoint, b: SpeedPoint, count: int) -> bool:
@@ -188,9 +191,16 @@ class BranchPath:
         return self._make(self._solved)
 
     def take(self, spinning: Spinning) -> SpeedPoint:
-        """Make modes that are solved between the two speeds part of the model; return them joined with the branches."""
-        self._solved = sorted([*self._solved, spinning], key=lambda s: s.speed)
-        self.model = self._make(self._solved)
+        """Make modes that are solved between the two speeds a node of the model, and return them joined."""
+        first, *inner, last = self._solved
+
+        def apart(s: Spinning) -> bool:
+            return abs(s.speed - spinning.speed) > NODES_APART * (last.speed - first.speed)
+
+        if apart(first) and apart(last):
+            inner = sorted([spinning, *filter(apart, inner)], key=lambda s: s.speed)
+            self._solved = [first, *inner, last]
+            self.model = self._make(self._solved)
         return self.joined(spinning)
 
     def inside(self, point: SpeedPoint) -> SpeedPoint:

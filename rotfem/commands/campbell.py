@@ -52,19 +52,17 @@ def parse_speeds(text: str) -> list[float]:
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
     )
-    speeds = list[float]()
-    with suppress(ValueError):
+    speeds: Array = np.empty(0)
+    with suppress(ValueError), np.errstate(invalid="ignore"):
         numbers, unit = split_unit(text)
         if ":" in numbers:
             first, last, number = numbers.split(":")
-            ends, count = (float(first) * unit, float(last) * unit), int(number)
-            if max(map(abs, ends)) <= LARGEST:
-                speeds = [float(s) for s in np.linspace(*ends, count)]
+            speeds = np.linspace(float(first) * unit, float(last) * unit, int(number))
         else:
-            speeds = [float(s) * unit for s in numbers.split(",")]
-    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
+            speeds = np.array([float(s) * unit for s in numbers.split(",")])
+    if len(speeds) < 2 or not np.all(np.abs(speeds) <= LARGEST) or np.any(np.diff(speeds) <= 0):
         raise SceneError("command line", "--speeds", text, allowed)
-    return speeds
+    return [float(s) for s in speeds]
 
 
 def campbell(

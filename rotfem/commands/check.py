@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.commands.fields import BETWEEN, columns_of
+from rotfem.commands.fields import BETWEEN, columns_of, surface_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.model import Model, rigid_body
@@ -66,7 +66,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
             "timings": {"total": perf_counter() - started},
         }
         coordinates, _ = model.structure.nodes(model.structure.k.functions[0].x.array)
-        return CheckResult(found, columns, coordinates, model.structure.surface())
+        return CheckResult(found, columns, coordinates, surface_of(model.structure, coordinates))
 
 
 def doubts(columns: Mapping[str, Array]) -> list[str]:

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.equations.system import System
-from rotfem.results.files import whole_hdf5, write_whole
+from rotfem.results.files import whole_hdf5, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import HALF_WIDTH, Surface
@@ -185,7 +184,7 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
     """
     points, triangles = structure.places(shape), structure.surface()
     if triangles is not None:
-        return Surface.of_plate(points, triangles, structure.length)
+        return Surface(points, triangles, np.arange(len(points)), np.zeros_like(points), structure.length)
     c = columns_of(structure, shape["x"])
     stiffnesses = ("EI", "EI") if structure.data.is_planar else ("EI3", "EI2")
     halves = [HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))[:, None] for EI in stiffnesses]
@@ -198,13 +197,14 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
 
 def modes_writer(analysis: Any, result: ModesResult) -> Writer:
     """Return what writes the surface of modes as modes.xdmf; the time is the number of the mode."""
-    surface, shapes = result.surface, result.shapes
+    surface = result.surface
     assert surface is not None
 
     def write(folder: Path) -> list[Path]:
         if analysis.comm.rank != 0:
             return []
-        frames = surface.frames(shapes, 1 + len(result.rows) - len(shapes))
+        moved = ((row["mode"], surface.moved(shape)) for row, shape, _ in result.with_shapes())
+        frames = ((number, {"displacement": z.real, "displacement_imag": z.imag}) for number, z in moved)
         return write_xdmf(folder / "modes.xdmf", surface.points, surface.triangles, frames)
 
     return write
@@ -222,34 +222,33 @@ def write_xdmf(
     with values (n,) or (n, 3) by name, the same names at all times.
     """
     heavy, per_cell = path.with_suffix(".h5"), cells.shape[1]
-    root = ET.Element("Xdmf", Version="3.0")
-    series = ET.SubElement(ET.SubElement(root, "Domain"), "Grid", Name=path.stem, GridType="Collection")
-    series.set("CollectionType", "Temporal")
+    kind = "Polyline" if per_cell == 2 else "Triangle"
+    text = [
+        '<Xdmf Version="3.0"><Domain>',
+        f'<Grid Name="{path.stem}" GridType="Collection" CollectionType="Temporal">',
+    ]
     with whole_hdf5(heavy) as file:
-        file["points"], file["cells"] = points, cells
+
+        def item(name: str, values: npt.NDArray[Any]) -> str:
+            """Return where in the HDF5 file values are, which are written there if they are not yet."""
+            if name not in file:
+                file[name] = values
+            number, shape = "Int" if values.dtype.kind == "i" else "Float", " ".join(map(str, values.shape))
+            head = f'<DataItem Dimensions="{shape}" NumberType="{number}" Precision="8" Format="HDF">'
+            return f"{head}{heavy.name}:/{name}</DataItem>"
+
         for number, (t, fields) in enumerate(frames):
-            grid = ET.SubElement(series, "Grid", Name=path.stem, GridType="Uniform")
-            ET.SubElement(grid, "Time", Value=repr(float(t)))
-            kind = {"TopologyType": "Polyline" if per_cell == 2 else "Triangle", "NodesPerElement": str(per_cell)}
-            topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(cells)))
-            _refer(topology, heavy.name, "cells", cells)
-            _refer(ET.SubElement(grid, "Geometry", GeometryType="XYZ"), heavy.name, "points", points)
+            text.append(f'<Grid Name="{path.stem}" GridType="Uniform"><Time Value="{float(t)!r}"/>')
+            topology = f'<Topology TopologyType="{kind}" NodesPerElement="{per_cell}" NumberOfElements="{len(cells)}">'
+            text.append(f"{topology}{item('cells', cells)}</Topology>")
+            text.append(f'<Geometry GeometryType="XYZ">{item("points", points)}</Geometry>')
             for name, values in fields.items():
-                file[f"{name}/{number}"] = values
                 what = "Vector" if values.ndim > 1 else "Scalar"
-                attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=what, Center="Node")
-                _refer(attribute, heavy.name, f"{name}/{number}", values)
-    ET.indent(root)
-    write_whole(path, ET.tostring(root, encoding="utf-8", xml_declaration=True))
+                head = f'<Attribute Name="{name}" AttributeType="{what}" Center="Node">'
+                text.append(f"{head}{item(f'{name}/{number}', values)}</Attribute>")
+            text.append("</Grid>")
+    write_text(path, "\n".join([*text, "</Grid></Domain></Xdmf>", ""]))
     return [path, heavy]
-
-
-def _refer(parent: ET.Element, file: str, name: str, values: npt.NDArray[np.generic]) -> None:
-    """Say where in the HDF5 file the values of an element are."""
-    kind = "Int" if values.dtype.kind == "i" else "Float"
-    shape = " ".join(map(str, values.shape))
-    item = ET.SubElement(parent, "DataItem", Dimensions=shape, NumberType=kind, Precision="8", Format="HDF")
-    item.text = f"{file}:/{name}"
 
 
 def chain(points: int) -> npt.NDArray[np.int64]:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rotfem.results.columns import ZERO, Columns, ShortTable, number, numbers, per_cent
 from rotfem.results.files import json_text
 from rotfem.results.result import Array, Result, Row, Rows
-from rotfem.results.surfaces import HALF_WIDTH
+from rotfem.results.surfaces import Surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,13 +37,13 @@ class CheckResult(Result):
             the centre of mass), `inertia_axis` (kg·m², about the axis of rotation), `elements`, warnings; JSON-able.
         columns: of a beam, properties along it over `x` (m).
         nodes: coordinates of the nodes by name (m).
-        triangles: between the nodes, of a plate; None of a beam.
+        surface: of the structure, as modes move it.
     """
 
     summary: dict[str, Any]
     columns: dict[str, Array]
     nodes: dict[str, Array]
-    triangles: npt.NDArray[np.int64] | None = None
+    surface: Surface
     figure = "results.of_scene:check_figure"
 
     @property
@@ -101,9 +100,14 @@ def check_figure(result: CheckResult) -> Figure:
     panels = [panel for panel in there if any(np.any(columns[n]) for n in panel[0])]
     figure = Figure(figsize=(10, 4.2 + 1.2 * len(panels)), layout="constrained")
     grid = figure.add_gridspec(2 + len(panels), 4, height_ratios=[1.7, 1.7, *[1.0] * len(panels)])
-    views = ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2))
-    for spot, i, j in views:
-        _view(figure.add_subplot(spot), result, i, j)
+    points, center = result.surface.points, result.summary["center_of_mass"]
+    for spot, i, j in ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2)):
+        axis = figure.add_subplot(spot)
+        axis.triplot(points[:, i], points[:, j], result.surface.triangles, lw=0.3, color="0.4")
+        axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
+        dress(axis, f"axis {i + 1} (m)", f"axis {j + 1} (m)")
+        if (i, j) == (1, 2):  # the angles of sections are what they are
+            axis.set_aspect("equal", adjustable="datalim")
     for row, (names, title, logarithmic) in enumerate(panels, start=2):
         axis = figure.add_subplot(grid[row, :])
         for name, dashes in zip(names, ("-", "--", ":", "-."), strict=False):  # equal ones lie on each other
@@ -120,35 +124,6 @@ def check_figure(result: CheckResult) -> Figure:
     s = result.summary
     figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m, axes of the rotating frame", fontsize=10)
     return figure
-
-
-def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
-    """Draw the structure over axes i and j (from 0) of the frame."""
-    from rotfem.results.plots import dress
-
-    c, triangles = result.columns, result.triangles
-    if "axis_1" in c:
-        r = np.stack([c[f"axis_{n}"] for n in (1, 2, 3)], axis=-1)
-        for across, EI, colour in ((2, "EI3", "C0"), (3, "EI2", "C1")):
-            half = HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))
-            ends = half[:, None] * np.stack([c[f"t{across}_{n}"] for n in (1, 2, 3)], axis=-1)
-            for end in (r + ends, r - ends):
-                axis.plot(end[:, i], end[:, j], lw=0.8, color=colour)
-            for place in np.linspace(0, len(r) - 1, 12).astype(int):
-                line = np.stack([r[place] - ends[place], r[place] + ends[place]])
-                axis.plot(line[:, i], line[:, j], lw=0.6, color=colour)
-    else:
-        x = result.nodes["x"]
-        r = np.column_stack([x, result.nodes.get("y", 0.0 * x), 0.0 * x]) + result.summary["root"]
-    if triangles is not None and (i, j) == (0, 1):
-        axis.triplot(r[:, 0], r[:, 1], triangles, lw=0.3, color="0.5")
-    else:
-        axis.plot(r[:, i], r[:, j], "k", lw=1.2)
-    center = result.summary["center_of_mass"]
-    axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
-    dress(axis, f"axis {i + 1} (m)", f"axis {j + 1} (m)")
-    if (i, j) == (1, 2):  # the angles of sections are what they are
-        axis.set_aspect("equal", adjustable="datalim")
 
 
 # --- explanations -----------------------------------------------------------------------------------------------------

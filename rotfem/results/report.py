@@ -93,7 +93,7 @@ def facts(summary: Mapping[str, Any]) -> str:
         elif key in ("effects", "outputs") and value:
             found[key] = ", ".join(value)
     found["computing time (s)"] = summary.get("timings", {}).get("total")
-    return listed({key: number(value) if isinstance(value, float) else value for key, value in found.items()})
+    return listed({key: number(value, 0.0) if isinstance(value, float) else value for key, value in found.items()})
 
 
 def listed(found: Mapping[str, Any]) -> str:
@@ -122,15 +122,14 @@ def of_columns(columns: Columns) -> ShortTable:
     texts = []
     for name in columns.values:
         is_number, values = name in columns.numbers, list[Any](columns.array(name)[:MOST_ROWS])
-        texts.append([number(v) if is_number and np.isfinite(v) else "–" if is_number else str(v) for v in values])
+        texts.append(["–" if is_number and np.isnan(v) else f"{v:.6g}" if is_number else str(v) for v in values])
     return ShortTable(tuple(map(label_of, columns.values)), list(zip(*texts, strict=True)))
 
 
 def errors(summary: Mapping[str, Any]) -> Iterator[ShortTable]:
     """Yield the contributions to the error, and what other settings cost, as far as these were estimated."""
-    parts = {name: value for name, value in summary.get("error", {}).items() if name != "time_at"}
-    rows = [(f"{name} (m)" if name == "scale" else name, number(value)) for name, value in parts.items()]
-    yield ShortTable(("of", "relative error (–)"), rows)
+    parts = {name: value for name, value in summary.get("error", {}).items() if name not in ("scale", "time_at")}
+    yield ShortTable(("of", "relative error (–)"), [(name, number(value, 0.0)) for name, value in parts.items()])
     settings = [{k: row.get(k) for k in ("words", "error", "seconds")} for row in summary.get("settings", ())]
     yield of_columns(Columns.of_rows(settings))
 

@@ -33,7 +33,7 @@ def test_modes_on_three_processes(tmp_path: Path) -> None:
 
 def test_modes_of_a_large_plate_on_two_processes(tmp_path: Path) -> None:
     """More than 5000 unknowns, whose pairs are computed by blocks; on one process from those of half the cells."""
-    large = RECTANGLE | {"mesh": "elements = [20, 20]"}
+    large = RECTANGLE | {"mesh": "elements = [16, 16]"}
     (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**large))
     found = []
     for ranks in (1, 2):

@@ -52,11 +52,6 @@ ALL: dict[str, Any] = {
 }
 
 
-#: The beam vibrates after the pull of a moment.
-RUNNING = {"type": "constant", "speed": 2.0}
-PULLED = {"tip_force": [[0, 0, 0], [0.1, 0, 10.0], [0.2, 0, 0], [20.0, 0, 0]]}
-
-
 def scene(tables: dict[str, Any], changes: dict[str, Any] | None = None) -> Scene:
     return Scene.from_dict(copy.deepcopy(tables)).replace(changes or {})
 
@@ -302,7 +297,7 @@ def test_change_by_damping_that_long_steps_hide() -> None:
     """Steps damp and delay the undamped vibration of a beam in gusts more than the damped one."""
     section = {"EA": 2.2e8, "GA": 7.0e7, "EI": 2.0e4, "mass_per_length": 8.0, "rotary_inertia": 9e-4}
     beam = {"type": "planar_beam", "length": 4.2, "hub_radius": 0.3, "section": section}
-    gusts = [[0, 0, 0], [4, 0, 20.0], [9, 0, -10.0], [15, 0, 25.0], [22, 0, 5.0], [30, 0, 0]]
+    gusts = [[0, 0, 0], [4, 0, 20.0], [9, 0, -10.0], [12, 0, 25.0]]
     asked = Scene.from_dict(
         {
             "structure": {**beam, "damping": {"rayleigh": [0.5, 5e-5]}},
@@ -311,7 +306,7 @@ def test_change_by_damping_that_long_steps_hide() -> None:
             "loads": {"distributed": gusts},
             "initial": {"state": "undeformed"},
             "mesh": {"elements": 2},
-            "time": {"end": 30.0, "step": 0.03},
+            "time": {"end": 12.0, "step": 0.03},
         }
     )
     finer = asked.replace({"time.scheme": "esdirk4", "output.error": False})
@@ -368,21 +363,12 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
     assert any("gravity turns in the rotating frame: taken as at t = 0" in line for line in found["warnings"])
 
 
-def test_steps_of_more_than_a_period_do_not_matter() -> None:
-    """The comparison has steps of its own; the truth is of adaptive steps."""
-    asked = scene(SPIN_UP, {"time": {"end": 8.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED})
-    fine = asked.replace({"time": {"end": 8.0, "tolerance": 1e-3, "output_step": 0.05}, "output.error": False})
-    rest = ["centrifugal", "rotary_inertia"]
-    true = distance(tip(rotfem.run(fine)), tip(rotfem.run(fine.replace({"model.effects": rest}))))
-    assert true / 3 < rows_of(asked)["coriolis"]["estimate"][HISTORY] < 3 * true
-
-
 def test_an_own_model_that_fails_is_reported() -> None:
     result = rotfem.explain(scene(SPIN_UP, {"model.theory": "linear", "motion.speed": 9.0}))
     coriolis = next(line for line in report(result) if line.startswith("without coriolis"))
     assert coriolis.split()[2] == "inf"
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
-    assert '"estimate"' in result.files()["explain.json"]
+    assert '"estimate"' in result.texts()["explain.json"]
     result.drawings()["explain.png"]()
 
 
