@@ -99,8 +99,8 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
 
 
 def on_other_meshes(own: Setting) -> list[Coarser]:
-    """Return settings on half the cells, of one degree less, and of one more, which is there where elements lock."""
-    degrees = [Coarser(replace(own, degree=own.degree - 1), 1.0)] if own.degree > 1 else []
+    """Return settings on half the cells, of one degree less, and of one more; elements of degree 1 lock."""
+    degrees = [Coarser(replace(own, degree=own.degree - 1), 1.0)] if own.degree > 2 else []
     degrees.append(Coarser(replace(own, degree=own.degree + 1), BEYOND))
     if own.elements is None:
         return degrees
@@ -183,6 +183,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         parts: whether errors of steps and mesh are wanted one by one.
     """
     scene, setting, scale = answers.scene, own.setting, own.output.scale
+    if setting.step is not None and answers.times is not None:  # rows at which steps of twice the length end, too
+        answers.times = np.unique(np.append(answers.times[::2], answers.times[-1]))
     out = Errors({}, scale=scale, each=[None] * len(own.output.values) if isinstance(own.output, Spectrum) else [])
     if parts and setting.moving and scene.time is not None:
         longer = in_longer_steps(setting, scene.time.end)
@@ -229,7 +231,9 @@ def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list
         following = finer(own.setting)
         out.rows = [row(found.setting, apart.size, found.seconds), row(own.setting, error, own.seconds)]
         if other.factor > 1.0:
-            out.rows.append(row(following, error / (other.factor + 1.0), own.predicted(following), True))
+            growth = max(1.0, own.seconds / max(found.seconds, 1e-3))  # of no more than the work: one-off costs
+            seconds = min(own.seconds * growth, own.predicted(following))
+            out.rows.append(row(following, error / (other.factor + 1.0), seconds, True))
     return found
 
 
@@ -343,21 +347,9 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
         how = "out of its range" if model >= 1.0 else f"in error by about {100 * model:.2g} %"
         said.append(f'model.theory = "{own.theory}" is {how} here; "{exact_theory(scene)}" is exact')
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
-    allowed = max(NOTICED, own.tolerance or 0.0)
-    if rest > allowed and not errors.each:
-        cures = ["a higher mesh.degree" if own.elements is None else "more mesh.elements"]
-        if own.step is not None:
-            cures.insert(0, f"time.step = {rounded_down(own.step * (allowed / 2 / rest) ** 0.5)} or shorter")
-        elif own.tolerance is not None:
-            cures.insert(0, f"time.tolerance = {rounded_down(own.tolerance * allowed / 2 / rest)}")
+    if rest > max(NOTICED, own.tolerance or 0.0) and not errors.each:
         what, of = ("tip", " of its largest displacement") if own.moving else ("result", "")
         said.append(
-            f"the {what} may be in error by {percent(rest)}{of}; to reduce it: {', '.join(cures)}, or --accuracy"
+            f"the {what} may be in error by {percent(rest)}{of}; to reduce it: {finer(own).words()}, or --accuracy"
         )
     return said
-
-
-def rounded_down(x: float) -> str:
-    """Return a positive number with one digit, not above it."""
-    power = 10.0 ** math.floor(math.log10(x))
-    return f"{math.floor(x / power * (1 + 1e-9)) * power:.1g}"

@@ -46,6 +46,10 @@ FINEST, MOST_STEPS = 1e-5, 200
 #: solve, and the last step of Newton's method: its error is about the square, 1e-7. Solutions for a zero, usually one.
 ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
 
+#: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
+#: multiplied by about its reciprocal.
+NODES_APART = 1e-4
+
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
 
@@ -198,9 +202,16 @@ class BranchPath:
         return self._make(self._solved)
 
     def take(self, spinning: Spinning) -> SpeedPoint:
-        """Make modes that are solved between the two speeds part of the model; return them joined with the branches."""
-        self._solved = sorted([*self._solved, spinning], key=lambda s: s.speed)
-        self.model = self._make(self._solved)
+        """Make modes that are solved between the two speeds a node of the model, and return them joined."""
+        first, *inner, last = self._solved
+
+        def apart(s: Spinning) -> bool:
+            return abs(s.speed - spinning.speed) > NODES_APART * (last.speed - first.speed)
+
+        if apart(first) and apart(last):
+            inner = sorted([spinning, *filter(apart, inner)], key=lambda s: s.speed)
+            self._solved = [first, *inner, last]
+            self.model = self._make(self._solved)
         return self.joined(spinning)
 
     def inside(self, point: SpeedPoint) -> SpeedPoint:

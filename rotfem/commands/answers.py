@@ -50,22 +50,21 @@ def clock_of(scene: Scene, comm: MPI.Comm, announce: Hint | None = None) -> Cloc
     return Clock(scene.accuracy_budget, lambda x: float(comm.bcast(x)), announce)
 
 
-def error_of(answers: Answers, own: Answer, comm: MPI.Comm, parts: bool = False) -> Errors | None:
-    """Return the error of an answer; None where Ctrl-C has ended its computation."""
+def with_error(result: R, answers: Answers, own: Answer, comm: MPI.Comm, parts: bool = False) -> R:
+    """Return a result with `error`, `settings` and the warnings of it in its summary; Ctrl-C leaves it without."""
+    started, found = perf_counter(), dict[str, Any]()
     try:
-        return estimate(answers, own, parts)
+        errors = estimate(answers, own, parts)
+        found, said = (
+            {"error": errors.summary(), "settings": errors.rows},
+            warnings_of(errors, own.setting, answers.scene),
+        )
     except KeyboardInterrupt as stop:
         if not together(comm, stop):
             raise
-        return None
-
-
-def with_error(result: R, errors: Errors | None, own: Answer, scene: Scene, started: float, **more: Any) -> R:
-    """Return a result with `error`, `settings` and the warnings of it in its summary."""
-    said = ["its error was not estimated: interrupted"] if errors is None else warnings_of(errors, own.setting, scene)
-    found = {} if errors is None else {"error": errors.summary(), "settings": errors.rows}
+        said = ["its error was not estimated: interrupted"]
     timings = {**result.summary["timings"], "error": perf_counter() - started}
-    return result.with_summary(**found, **more, warnings=[*result.summary["warnings"], *said], timings=timings)
+    return result.with_summary(**found, warnings=[*result.summary["warnings"], *said], timings=timings)
 
 
 def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish: Callable[[Any, Errors], R]) -> R:

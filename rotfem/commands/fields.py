@@ -184,7 +184,7 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
     """
     points, triangles = structure.places(shape), structure.surface()
     if triangles is not None:
-        return Surface.of_plate(points, triangles, structure.length)
+        return Surface(points, triangles, np.arange(len(points)), np.zeros_like(points), structure.length)
     c = columns_of(structure, shape["x"])
     stiffnesses = ("EI", "EI") if structure.data.is_planar else ("EI3", "EI2")
     halves = [HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))[:, None] for EI in stiffnesses]
@@ -197,13 +197,14 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
 
 def modes_writer(analysis: Any, result: ModesResult) -> Writer:
     """Return what writes the surface of modes as modes.xdmf; the time is the number of the mode."""
-    surface, shapes = result.surface, result.shapes
+    surface = result.surface
     assert surface is not None
 
     def write(folder: Path) -> list[Path]:
         if analysis.comm.rank != 0:
             return []
-        frames = surface.frames(shapes, 1 + len(result.rows) - len(shapes))
+        moved = ((row["mode"], surface.moved(shape)) for row, shape, _ in result.with_shapes())
+        frames = ((number, {"displacement": z.real, "displacement_imag": z.imag}) for number, z in moved)
         return write_xdmf(folder / "modes.xdmf", surface.points, surface.triangles, frames)
 
     return write

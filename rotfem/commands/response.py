@@ -168,7 +168,7 @@ def resolved(
     sides are halved, the worst first.
     """
     least, left = NARROW * float(omegas[-1] - omegas[0]), most
-    units = units_of(outputs)
+    units = np.array([described(name)[1] for name in outputs])
     of_one_unit = units[:, None] == units
     while left > 0:
         sizes = np.abs(values)
@@ -189,11 +189,6 @@ def resolved(
         omegas = np.insert(omegas, chosen + 1, further)
         left -= len(further)
     return omegas, values
-
-
-def units_of(outputs: Sequence[str]) -> Array:
-    """Return the units of outputs by their names, an array of strings."""
-    return np.array([described(name)[1] for name in outputs])
 
 
 def angular(value: float | str | None, option: str, default: float) -> float:

@@ -25,7 +25,7 @@ from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
-from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, error_of, to_accuracy, with_error
+from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, to_accuracy, with_error
 from rotfem.commands.explain import needed_model
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
@@ -411,8 +411,7 @@ def simulate(
         own = Answer(replace(Setting.of(scene), degree=degree), simulation, log.cpu + computing() - log.began)
         answers.keep(own)
         shown(result)
-        started = perf_counter()
-        return with_error(result, error_of(answers, own, comm, parts), own, scene, started)
+        return with_error(result, answers, own, comm, parts)
 
 
 #: Rows of a history that does not say it.

@@ -51,15 +51,6 @@ def heading(result: Result) -> str:
     return f"{result.title}, {result.summary.get('frame', 'rotating')} frame"
 
 
-def titled(width: float, height: float, title: str) -> tuple[Figure, float]:
-    """Return a figure of a width and, below its title, a height; and the part of the latter (inch)."""
-    lines = [part for line in title.split("\n") for part in wrap(line, int(12 * width))]
-    above = 0.05 + 0.18 * len(lines)
-    figure = Figure(figsize=(width, height + above))
-    figure.suptitle("\n".join(lines), fontsize=10, y=1.0 - 0.06 / (height + above), va="top")
-    return figure, height / (height + above)
-
-
 def panels_over(
     x: str, number: int, title: str, *, columns: int = 0, below: float = 0.0, beside: float = 0.0
 ) -> tuple[Figure, list[Axes]]:
@@ -71,7 +62,10 @@ def panels_over(
     rows = -(-max(number, 1) // columns)
     cell, height = max(5.0, 7.0 / columns), ROW * rows + BELOW + below
     width = cell * columns + beside
-    figure, part = titled(width, height, title)
+    lines = [part for line in title.split("\n") for part in wrap(line, int(12 * width))]
+    total = height + 0.05 + 0.18 * len(lines)
+    figure, part = Figure(figsize=(width, total)), height / total
+    figure.suptitle("\n".join(lines), fontsize=10, y=1.0 - 0.06 / total, va="top")
     across, panels = cell - LEFT - RIGHT, []
     for i in range(number):
         left, bottom = cell * (i // rows) + LEFT, height - ROW * (i % rows + 1)

@@ -19,7 +19,7 @@ from rotfem.errors import OutputError, SceneError, printable
 from rotfem.listeners import ONE_PROCESS
 from rotfem.registry import resolved
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, Variables, dataset
-from rotfem.results.files import json_text, write_whole
+from rotfem.results.files import write_whole
 from rotfem.results.result_set import RUNNING, ResultFolder, Writer
 
 if TYPE_CHECKING:
@@ -75,10 +75,6 @@ class Result(ABC):
         """Heading of figures: name of the scene, theory where there is one, and status unless it is done."""
         words = printable(": ".join(self.summary[key] for key in ("name", "theory") if key in self.summary))
         return words if self.status == "done" else f"{words} ({self.status})"
-
-    def files(self) -> dict[str, str]:
-        """Return file name ↦ text, in the order they are written: tables, then summary.json."""
-        return {**self.texts(), "summary.json": json_text(self.summary)}
 
     @property
     @abstractmethod

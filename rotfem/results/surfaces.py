@@ -7,7 +7,7 @@ A point of a section follows its centre and turns with it: u + θ × r, r from t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,11 +48,6 @@ class Surface:
     length: float
 
     @classmethod
-    def of_plate(cls, places: Array, triangles: npt.NDArray[np.int64], length: float) -> Surface:
-        """Return the mid-surface through nodes at places (n, 3), m."""
-        return cls(places, triangles, np.arange(len(places)), np.zeros_like(places), length)
-
-    @classmethod
     def of_beam(cls, places: Array, sides: tuple[Array, Array], length: float) -> Surface:
         """Return the four sides and both ends of a beam with rectangular sections.
 
@@ -80,12 +75,6 @@ class Surface:
 
         turns = vector(("theta1", "theta2", "theta3" if "theta3" in shape else "alpha")) / self.length
         return np.asarray(vector(("u1", "u2", "u3")) + np.cross(turns, self.arms))
-
-    def frames(self, shapes: Mapping[str, Mapping[str, Array]], first: int) -> Iterator[tuple[float, dict[str, Array]]]:
-        """Yield (number of the mode, its real and imaginary displacements), for files; `first` is that of the first."""
-        for number, shape in enumerate(shapes.values(), start=first):
-            z = self.moved(shape)
-            yield float(number), {"displacement": z.real, "displacement_imag": z.imag}
 
 
 # --- animations -------------------------------------------------------------------------------------------------------

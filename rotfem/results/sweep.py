@@ -60,8 +60,7 @@ class SweepResult(Rows):
     @property
     def names(self) -> list[str]:
         """Names of what was computed."""
-        no = {*self.keys, "status", "reason", "folder"}
-        return [name for name in dict.fromkeys(k for row in self.rows for k in row) if name not in no]
+        return [name for name in self.table.values if name not in (*self.keys, "status", "reason", "folder")]
 
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
@@ -69,11 +68,12 @@ class SweepResult(Rows):
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes sweep.nc."""
-        return [self._netcdf]
 
-    def _netcdf(self, folder: Path) -> None:
-        with writing(folder / "sweep.nc"):
-            self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
+        def write(folder: Path) -> None:
+            with writing(folder / "sweep.nc"):
+                self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
+
+        return [write]
 
     def drawn(self) -> dict[str, str]:
         """Return sweep.png; nothing where no quantity varies."""

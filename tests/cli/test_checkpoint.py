@@ -18,7 +18,7 @@ import rotfem
 from rotfem import ComputationError, SceneError
 from rotfem.commands import run_store
 from rotfem.commands.run import Simulation
-from rotfem.commands.run_store import interval, read_checkpoint
+from rotfem.commands.run_store import read_checkpoint
 from rotfem.results.files import read_csv
 from rotfem.scene import as_scene
 from rotfem.structures.reference_rotation import SectionTurns
@@ -54,16 +54,13 @@ TURNING = {
 
 #: Kinds of runs, each with something of its own to be remembered.
 KINDS: dict[str, dict[str, Any]] = {
-    "fixed steps": {},
     "every third row": {"time.output_every": 3},
     "rows between steps": {"time.output_step": 0.013},
     "inertial frame": {"model.frame": "inertial"},
     "linear": {"model.theory": "consistent_linear"},
-    "Newmark": {"time.scheme": "newmark"},
     "stages in turn": {"time.scheme": "esdirk4"},
     "adaptive": {"time": {"end": 0.4, "tolerance": 1e-3}},
     "free hub at stations": {"motion": HUB, "output": {"stations": 3}},
-    "free hub, adaptive": {"motion": HUB, "time": {"end": 0.4, "tolerance": 1e-3}},
     "rotations counted afresh": TURNING,
     "plate": {
         "structure": tomllib.loads(PLATE_TABLES)["structure"],
@@ -249,13 +246,6 @@ def test_what_cannot_be_resumed_is_said(folder: Path, rotfem: Any) -> None:
     steady = SCENE.split("[time]")[0].replace('"spin_up"', '"constant"').replace("duration = 2.0\n", "")
     (folder / "beam.toml").write_text(steady)
     assert "a steady state has no steps" in refused(rotfem, "--checkpoint", "3")
-
-
-def test_intervals() -> None:
-    assert (interval("30s"), interval("500"), interval(500)) == (30.0, 500, 500)
-    assert isinstance(interval("30s"), float)
-    with pytest.raises(SceneError, match="--checkpoint"):
-        interval("soon")
 
 
 @dataclass

@@ -63,6 +63,7 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
     ("arguments", "says"),
     [
         (("--theories", "reisner"), 'did you mean "reissner"'),
+        (("--schemes", "euler"), "cost --schemes"),
         (("--of", "tipp"), "allowed: tip, frequencies"),
         (("--accuracy", "0"), "must be a number greater than 0"),
         (("--budget", "soon"), 'cost --budget = "soon": must be a time greater than 0, such as 60s'),

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 Rotfem = Callable[..., Any]
 
 SCENE = """\
@@ -62,16 +60,7 @@ def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem)
     assert "by the full models" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("explain", "missing.toml"), "missing.toml"),
-        (("explain", "beam.toml", "--set", "model.on_exceed=no"), "model.on_exceed"),
-        (("explain", "beam.toml", "-o", "beam.toml/out"), "beam.toml/out"),
-    ],
-)
-def test_bad_input(rotfem: Rotfem, arguments: tuple[str, ...], message: str) -> None:
-    done = rotfem(*arguments)
-    assert (done.status, done.out) == (2, "")
-    assert message in done.err
-    assert "Traceback" not in done.err
+def test_modes_say_that_they_have_all_effects(rotfem: Rotfem) -> None:
+    done = rotfem("modes", "beam.toml", "--set", "model.effects=needed", "--no-plots", "--no-error")
+    assert "all effects are in" in done.out
+    assert "effects: coriolis, centrifugal, rotary_inertia" in done.out

@@ -148,7 +148,7 @@ def check_answer(row: Row, result: Any, folder: Path) -> None:
     columns = columns_of(result)
     summary = {key: value for key, value in result.summary.items() if key not in ("scene", "timings")}
     check_finite({"summary": summary, "result": columns}, row["command"])
-    assert result.files()
+    assert result.texts()
     if row["command"] != "run":
         return
     if row["time"] != "accuracy":  # whose rows are between its steps

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from rotfem.accuracy.answer import Answers
+from rotfem.accuracy.ladder import Clock
 from rotfem.accuracy.tuned import write_variant
 from rotfem.commands.advice import advise
-from rotfem.commands.cost import ERRORS, pareto, recommend
+from rotfem.commands.cost import Study, pareto, recommend
+from rotfem.commands.explain import Output
 from rotfem.errors import SceneError
 from rotfem.results.distance import Series, Spectrum
 from rotfem.results.result import Row
@@ -49,6 +54,17 @@ def test_a_row_cannot_win_by_being_nearer_than_the_reference_is_known() -> None:
     assert [row for row in pareto(table) if row["at_most"]] == [cheapest]
     assert recommend(table, 1e-2, 1e-2) is cheapest
     assert recommend(table, 0.9e-2, 1e-2) is None
+
+
+def test_errors_are_unknown_where_that_of_the_reference_is() -> None:
+    """The budget leaves one rung, which is as far from the truth as nobody knows."""
+    scene = Scene.from_dict(BEAM)
+    answers = partial(Answers, scene, lambda variant, times: Output(Spectrum(np.ones(2))), moving=False)
+    study = Study(answers, 1e-2, Clock(0.0), MPI.COMM_SELF, lambda share: None)
+    study.climb(["reissner"], ["esdirk4"])
+    assert study.refused
+    assert {row["total_error"] for row in study.rows()} == {None}
+    assert recommend(study.rows(), 1.0, study.known) is None
 
 
 def test_distances() -> None:
@@ -93,7 +109,3 @@ def test_advice_is_given_where_it_is_due() -> None:
     assert "3.8 rad/s" in theory
     assert said({"model.theory": "linear", "motion.speed": 3.0}, critical=3.8) == []
     assert advise(Scene.from_dict(BEAM).replace({"model.theory": "linear"}), None, critical=3.8) == []
-
-
-def test_the_figure_names_the_error_of_every_output() -> None:
-    assert set(ERRORS) == {"tip", "frequencies", "campbell"}

@@ -16,7 +16,6 @@ from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import Surface
 from tests.figures import check
-from tests.unit.test_result_classes import ALL
 
 ZERO = "0 (below 1e-9 of the largest of the unit): "
 
@@ -27,11 +26,6 @@ def said(**more: Any) -> dict[str, Any]:
 
 def titles(figure: Any) -> list[str]:
     return [axes.get_title(loc="left") for axes in figure.axes]
-
-
-@ALL
-def test_every_result_has_a_figure_that_can_be_read(make: Any) -> None:
-    check(make().plot())
 
 
 # --- Campbell diagrams ------------------------------------------------------------------------------------------------

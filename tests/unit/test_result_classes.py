@@ -13,6 +13,7 @@ import xarray
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import SHORT, Columns, ShortTable, described, label, numbers
+from tests.figures import check
 
 T = np.array([0.0, 0.5, 1.0])
 X = np.array([0.0, 2.0, 4.0])
@@ -209,7 +210,9 @@ def test_a_result_is_a_line_at_a_prompt_and_tables_with_a_figure_in_a_notebook(m
     assert "mind the gap" in page
     assert page.count("<img src=") == 1
     assert page.count("<table>") == len(result.tables())
-    assert result.plot()._repr_png_().startswith(b"\x89PNG"), "a notebook shows figures without a magic word"
+    figure = result.plot()
+    check(figure)
+    assert figure._repr_png_().startswith(b"\x89PNG"), "a notebook shows figures without a magic word"
     paths = result.draw(tmp_path)
     assert [path.name for path in paths] == list(result.drawings()) != []
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)

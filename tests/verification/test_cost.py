@@ -133,17 +133,3 @@ def test_an_interrupted_study_keeps_what_is_measured() -> None:
     result = stopped.value.result
     assert result.status == "interrupted"
     assert result.recommend(1e-2) is not None
-
-
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        ({"accuracy": -1.0}, "greater than 0"),
-        ({"output": "tipp"}, "tip, frequencies"),
-        ({"theories": ["reisner"]}, 'did you mean "reissner"'),
-        ({"schemes": ["euler"]}, "cost --schemes"),
-    ],
-)
-def test_bad_arguments_are_refused(more: dict[str, Any], says: str) -> None:
-    with pytest.raises(rotfem.SceneError, match=says):
-        rotfem.cost(SHORT, **more)

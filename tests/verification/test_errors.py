@@ -10,7 +10,6 @@ import pytest
 
 import rotfem
 from rotfem.accuracy import errors as module
-from rotfem.accuracy.errors import rounded_down
 from rotfem.results.distance import Series
 
 pytestmark = pytest.mark.estimated
@@ -152,11 +151,6 @@ def test_the_table_of_settings() -> None:
     assert (coarse["setting"]["step"], own["setting"]["step"], following["setting"]["step"]) == (0.1, 0.05, 0.025)
     assert (coarse["setting"]["elements"], following["setting"]["elements"]) == (2, 8)
     assert [row.get("extrapolated", False) for row in (coarse, own, following)] == [False, False, True]
-
-
-@pytest.mark.parametrize(("x", "text"), [(0.0199, "0.01"), (0.02, "0.02"), (3e-4, "0.0003"), (9.99e-7, "9e-07")])
-def test_advice_is_rounded_down(x: float, text: str) -> None:
-    assert rounded_down(x) == text
 
 
 # --- the error of a theory --------------------------------------------------------------------------------------------

@@ -134,23 +134,6 @@ def test_rows_over_speed_say_what_modes_say() -> None:
     assert [row["mesh_error"] for row in over_speed] == pytest.approx(larger, rel=1e-3)
 
 
-def test_errors_can_be_left_out() -> None:
-    """Then no other mesh is computed, and rows have none."""
-    tables = {"structure": BEAM, "motion": {"type": "constant", "speed": 0.0}, "output": {"error": False}}
-    found = modes(tables)
-    assert "error" not in found.summary
-    assert all("mesh_error" not in row for row in found.rows)
-
-
-def test_errors_of_a_large_plate_change_no_frequency() -> None:
-    """They begin with the other mesh, whose iterations say nothing of those to the own equilibrium."""
-    structure = {**plate(1.0), "width": 0.3, "thickness": 3e-3}
-    tables = {"structure": structure, "motion": {"type": "constant", "speed": 30.0}, "modes": {"count": 3}}
-    tables |= {"mesh": {"elements": [34, 10]}}
-    without = modes({**tables, "output": {"error": False}})
-    np.testing.assert_allclose(modes(tables).frequencies, without.frequencies, rtol=1e-9)
-
-
 def test_effectivity_tends_to_one() -> None:
     """Frequencies on elements of degree 1 converge with order 2: estimate over error tends to 1 (within a tenth)."""
     scene = {"structure": BEAM, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 1}}

@@ -150,12 +150,6 @@ def test_a_free_hub_swings_too():
         assert abs(cosine - 1j * sine - found) < 0.01 * abs(found), name
 
 
-def test_a_free_hub_is_not_held():
-    hub = {"type": "torque", "hub_inertia": 100.0}
-    with pytest.raises(SceneError, match="above 0 of a free hub"):
-        response(scene(motion=hub), 0.0, 10.0, number=3)
-
-
 def test_without_damping_it_is_said():
     tables = scene(structure=STRUCTURE)
     warned = response(tables, 1.0, 10.0, number=3)
@@ -163,22 +157,20 @@ def test_without_damping_it_is_said():
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "asked", "message"),
     [
-        ({"loads": {}}, "needs a harmonic load"),
-        ({"loads": {"tip_force": {**LOAD, "table": [[0, 0, 0], [1, 0, 1]]}}}, "must be constant or harmonic"),
-        ({"loads": {"tip_force": {"table": [[0, 0, 0], [1, 0, 1]]}}}, "needs a harmonic load"),
+        ({"loads": {}}, {}, "needs a harmonic load"),
+        ({"loads": {"tip_force": {**LOAD, "table": [[0, 0, 0], [1, 0, 1]]}}}, {}, "must be constant or harmonic"),
+        ({"loads": {"tip_force": {"table": [[0, 0, 0], [1, 0, 1]]}}}, {}, "needs a harmonic load"),
+        ({"motion": {"type": "torque", "hub_inertia": 100.0}}, {"low": 0.0, "high": 10.0}, "above 0 of a free hub"),
+        ({}, {"low": 2.0, "high": 1.0}, "--from"),
+        ({}, {"low": "3 m"}, "--from"),
+        ({}, {"per_rev": (0.0,)}, "--per-rev"),
     ],
 )
-def test_what_has_none_is_refused(changes, message):
+def test_what_has_none_is_refused(changes, asked, message):
     with pytest.raises(SceneError, match=message):
-        response(scene(**changes))
-
-
-@pytest.mark.parametrize(("low", "high", "per_rev"), [(2.0, 1.0, ()), ("3 m", None, ()), (None, None, (0.0,))])
-def test_wrong_frequencies_are_refused(low, high, per_rev):
-    with pytest.raises(SceneError, match=r"--from|--per-rev"):
-        response(scene(), low, high, per_rev=per_rev)
+        response(scene(**changes), **asked)
 
 
 def test_files_and_figure(swept, tmp_path):

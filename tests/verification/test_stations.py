@@ -80,14 +80,9 @@ def test_statics() -> None:
 
 def test_nothing_reaches_over_a_step_of_the_section() -> None:
     """EI jumps by ten at mid-span: M = F (L − X) does not, nor M/EI beside it; a station there is the outer one."""
-    step = [[0.0, 1.4e5], [5.0, 1.4e5], [5.0, 1.4e4], [10.0, 1.4e4]]
-    section = {**STRUCTURE["section"], "EI": step}
-    try:
-        rotfem.Scene.from_dict({**SPIN_UP, "structure": {**STRUCTURE, "section": section}})
-    except rotfem.SceneError:
-        section["EI"] = [[0.0, 1.4e5], [4.999, 1.4e5], [5.0, 1.4e4], [10.0, 1.4e4]]
+    step = [[0.0, 1.4e5], [4.999, 1.4e5], [5.0, 1.4e4], [10.0, 1.4e4]]
     scene = {
-        "structure": {**STRUCTURE, "section": section},
+        "structure": {**STRUCTURE, "section": {**STRUCTURE["section"], "EI": step}},
         "motion": {"type": "constant", "speed": 0.0},
         "model": {"theory": "linear"},
         "loads": {"tip_force": [0.0, 3.0]},
