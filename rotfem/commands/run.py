@@ -185,7 +185,9 @@ class Simulation:
         scheme = scheme_of(time)
         march = self.march = March(self.system, scheme, Steps.of(time), self.iteration, start.q, start.v)
         march.reached = self.store.start(self._memory())
-        times = self.times if time.output_step is None else multiples(time.output_step, time.end)
+        times = self.times
+        if times is None and time.output_step is not None:
+            times = multiples(time.output_step, time.end)
         if times is not None:
             begin = 0.0 if march.reached is None else march.reached.t
             self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
