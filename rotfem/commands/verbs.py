@@ -324,7 +324,7 @@ def unbalance(
         str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range: 3000:3600rpm")
     ] = None,
 ) -> None:
-    """Compute the unbalance response of a shaft, SCENE, over its speed."""
+    """Compute the whirl of a shaft, SCENE, under its unbalances."""
     from rotfem.commands.unbalance import probe_of
     from rotfem.commands.unbalance import unbalance as answers
 

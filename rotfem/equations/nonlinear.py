@@ -165,7 +165,8 @@ class NonlinearSystem(System):
     @per_composition
     def _on_the_way(self) -> Any:
         """Return the tangent with these stresses, compiled; of a system that is not moving K alone at v = a = 0."""
-        purpose, more = f"on the way {self.model.theory.name}", (*self._stresses.functions, *self._shifts)
+        purpose = f"on the way {self.model.theory.name} {'moving' if self.moving else 'at rest'}"
+        more = *self._stresses.functions, *self._shifts
         return self.model.derived_forms(purpose, self._made_on_the_way, more, once=not self.moving)[1]["K"]
 
     def _made_on_the_way(self) -> dict[str, Any]:

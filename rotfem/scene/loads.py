@@ -360,7 +360,7 @@ class UnbalanceTable(SceneModel):
     x: Annotated[Number, unit("m")]
     kg_m: Annotated[Number, unit("kg*m")] | None = None
     phase: Annotated[Number, unit("rad")] = 0.0
-    grade: Positive | None = None
+    grade: Annotated[Positive, unit("mm/s")] | None = None
     mass: Annotated[Positive, unit("kg")] | None = None
     speed: Annotated[Positive, unit("rad/s")] | None = None
     start: Annotated[Number, unit("s")] = 0.0
