@@ -110,7 +110,22 @@ def test_region_and_type_decide():
 
 
 #: Numbers without a unit, and what has those of its table: matrices, ratios, amplitudes of loads.
-PURE = {"free", "nu", "nu12", "shear_correction", "stiffness", "mass", "axis", "tolerance", "per_rev", "value", "table"}
+PURE = {
+    "free",
+    "over_speed",
+    "over_frequency",
+    "over_both",
+    "nu",
+    "nu12",
+    "shear_correction",
+    "stiffness",
+    "mass",
+    "axis",
+    "tolerance",
+    "per_rev",
+    "value",
+    "table",
+}
 PURE |= {"accuracy", "increment_tolerance", "regions", "speed", "rate", "angle", "elements", "orders"}
 
 
