@@ -96,8 +96,9 @@ class FrequencyResponse:
 
 def tip_output(system: System) -> HarmonicOutput:
     """Return the unknowns at the tip."""
-    values = system.structure.tip_values
-    return HarmonicOutput(tuple(f"tip_{name}" for name in system.structure.components), lambda x, s: values(x))
+    structure = system.structure
+    names = tuple(f"tip_{name}" for name in structure.components)
+    return HarmonicOutput(names, lambda x, s: structure.whole_values(structure.tip_values(x)))
 
 
 def root_output(system: System, push: Array) -> HarmonicOutput:

@@ -187,7 +187,7 @@ class ModalAnalysis:
         started = perf_counter()
         #: Whether modes are those in the fixed frame.
         self.fixed = problem.frame == "fixed"
-        self.problem = problem if self.fixed else problem.replace(frame="rotating")
+        self.problem = problem.turning()
         self.about, self.comm = about, comm
         self.system = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure

@@ -39,7 +39,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
     scene = as_scene(scene)
     with input_of(scene.file):
         bringing = [effect.name for effect in Effect.registry if effect.name in ("rotary_inertia", "tip_mass")]
-        problem = Problem.of(scene).replace(frame="rotating", effects=tuple(bringing))
+        problem = Problem.of(scene).turning().replace(effects=tuple(bringing))
         linear = [theory for theory in Theory.registry if theory.linear and theory.holds_for(scene.structure.type)]
         if linear:  # at rest all are the same, and the forms of these are small
             problem = problem.replace(theory=min(linear, key=lambda theory: theory.rank).name)

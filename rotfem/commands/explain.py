@@ -211,7 +211,8 @@ class Explanation:
 
     def __init__(self, scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm, whole: bool = True):
         self.given, self.terms, self.comm = scene, terms, comm
-        self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": "rotating"})
+        frame = "rotating" if scene.model.frame == "inertial" else scene.model.frame
+        self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": frame})
         self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
         self.inner, self.effects = communicator(problem, comm), problem.replace(effects=None).effective_effects()
         self._systems: dict[tuple[str, str], Any] = {}

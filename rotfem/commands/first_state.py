@@ -64,7 +64,7 @@ def _equilibrium(scene: Scene, problem: Problem, system: System, judged: bool) -
     """Return the equilibrium under the speed, loads and pitch of t = 0 (see `first_state`); undeformed without any."""
     solver, start, speed = scene.solver, Start(), problem.motion.speed(0.0)
     if problem.frame == "inertial":
-        system = compile_system(problem.replace(frame="rotating"), system.comm, moving=False)
+        system = compile_system(problem.turning(), system.comm, moving=False)
     if speed == 0.0:
         system.set_time(0.0, system.motion.at_speed(0.0))
         system.set_state(system.zeros())

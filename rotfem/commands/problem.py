@@ -249,7 +249,7 @@ class Problem(ProblemData):
             ComputationError: no equilibrium was reached; says how far the load got.
         """
         speed = self._speed(speed)
-        still = self.replace(frame="rotating", motion=self.motion.at_speed(speed))
+        still = self.turning().replace(motion=self.motion.at_speed(speed))
         check_steady(still)
         system = still.system(moving=False, comm=comm)
         q = steady_state(system, speed, Newton())

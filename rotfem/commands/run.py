@@ -82,7 +82,7 @@ class Simulation:
         self.scene, self.clock, self.times, self.progress = scene, clock, times, progress
         self.comm, self.store, self.log = store.comm, store, Log()
         if scene.time is None and problem.frame == "inertial":
-            problem = problem.replace(frame="rotating")
+            problem = problem.turning()
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         if scene.time is not None and not (scene.model.all_unknowns or scene.initial.first is not None):
             problem = problem.replace(inactive=inactive_unknowns(problem))

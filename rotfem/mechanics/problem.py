@@ -128,6 +128,10 @@ class Problem:
         found = unbalances(self.structure, self.loads.unbalance)
         return found if self.frame == "fixed" else found[len(found) - len(self.loads.unbalance) :]
 
+    def turning(self) -> Self:
+        """Return the problem in the rotating frame where it is in the inertial one, else as it is."""
+        return self.replace(frame="rotating") if self.frame == "inertial" else self
+
     def pushed(self) -> Self:
         """Return the problem of a history, in which unbalances push."""
         found = self.unbalances

@@ -395,7 +395,7 @@ class SpatialBeam(Beam):
         if "rotary_inertia" in effects:
             bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
         bodies += self._tip_bodies() if "tip_mass" in effects else []
-        for i, support in enumerate(self.data.supports if "tip_mass" in effects else ()):
+        for i, support in enumerate(self.data.supports if {"supports", "tip_mass"} <= set(effects) else ()):
             for j, under in enumerate(support.housing):
                 mass = self.scalar(f"supports_{i}_housing_{j}_mass", under.mass)
                 x, at = ufl.as_vector((0, *self._housing(j))), self.points.measure((support.x,))

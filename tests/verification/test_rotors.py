@@ -579,3 +579,16 @@ def test_a_strut_holds_the_tip_of_a_blade() -> None:
 
     b = brentq(equation, 1.0, 3.9)
     np.testing.assert_allclose(found.frequencies, (b / length) ** 2 * np.sqrt(EI / m), rtol=1e-4)
+
+
+def test_every_verb_takes_a_shaft_on_any_bearing() -> None:
+    """Bearings that differ by direction on a housing: a force that stands still moves the tip as M, C, K say, 1e-4."""
+    scene = shaft_on_bearings([[2e4, 0.0], [0.0, 3e4]], 100.0)
+    scene["structure"]["supports"][1]["housing"] = [{"mass": 2.0, "stiffness": 5e4}]
+    assert rotfem.check(scene).mass == pytest.approx(10.0 + 1e-4)
+    assert rotfem.explain(scene).verdicts["supports"] != "negligible"
+    assert rotfem.run(scene).status == "done"
+    load = {"tip_force": {"harmonic": {"amplitude": [0.0, 1.0, 0.0], "frequency": 1e-3}}}
+    answer = rotfem.response(scene | {"loads": load}, 1e-3, 2e-3, number=2)
+    series = 1.0 / (1.0 / 2e4 + 1.0 / 5e4)  # the end stands on bearing and housing, with its weight on no other
+    np.testing.assert_allclose(answer.amplitude("tip_u2")[0], 1.0 / series, rtol=1e-4)
