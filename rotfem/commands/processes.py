@@ -32,7 +32,11 @@ SHARED_FROM = 10_000
 
 def communicator(problem: Problem, comm: MPI.Comm) -> MPI.Comm:
     """Return what a problem is discretised on: all processes where it is large, else each one by itself."""
-    least = float(os.environ.get("ROTFEM_SHARED_FROM") or SHARED_FROM)
+    given = os.environ.get("ROTFEM_SHARED_FROM")
+    try:
+        least = float(given or SHARED_FROM)
+    except ValueError:
+        raise InputError("ROTFEM_SHARED_FROM", given, "must be a number of unknowns") from None
     return comm if comm.size == 1 or unknowns(problem) >= least * comm.size else MPI.COMM_SELF
 
 
