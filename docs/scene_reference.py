@@ -90,7 +90,7 @@ TABLES: tuple[tuple[str, type[SceneModel], str], ...] = (
     ),
     (
         "Coefficients of supports as tables",
-        supports.OverSpeed,
+        supports.CoefficientTable,
         "toml spatial\nmotion = { type = 'constant', speed = 100, axis = [1, 0, 0] }\n[structure]\n"
         "supports = [{ x = 10, stiffness = { over_speed = [[0, 1e6], [100, 2e6, 3e6]] } }]",
     ),

@@ -39,7 +39,7 @@ diagram.plot()
 # %% [markdown]
 # ## How far does it whirl?
 #
-# A gram at 1 m, or 1 kg mm, beside the axis of the first disk, and bearings with some damping: one linear solution
+# A gram at 1 m, or 1 kg mm, off the axis of the first disk, and bearings with some damping: one linear solution
 # at each
 # speed gives the orbits of the shaft, and the forces on its bearings. A peak has its amplification factor, as API
 # 617 defines it.

@@ -275,7 +275,7 @@ class Sweep:
         known: speed ↦ modes there that are solved already.
         each: (items, work) ↦ what the work makes of every item; processes may share them out.
         paths: between each two points.
-        solves, inserted: speeds solved, and those that are points though nobody asked for them.
+        solves, inserted: speeds solved, and those that are points though they were not asked for.
     """
 
     def __init__(self, analysis: ModalAnalysis, count: int, only: bool = False, model: SpeedModel | None = None):

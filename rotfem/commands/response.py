@@ -79,6 +79,9 @@ def response(
     scene, started = as_scene(scene).showing("frequency", high if low is None else low), perf_counter()
     with input_of(scene.file):
         problem = Problem.of(scene)
+        if any(support.of_frequency for support in getattr(scene.structure, "supports", ())):
+            why = "depend on the frequency of whirl; modes, campbell and unbalance take them"
+            raise InputError("structure.supports", None, why)
         problem = problem.replace(loads=swept_loads(scene, problem.motion))
         analysis = analysis_of(scene, problem, comm)
         speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)

@@ -43,7 +43,7 @@ def unbalance(
     range, in parts of the nearer end of it (API 617, 8th edition, 1-2.6).
 
     Args:
-        scene: scene, path of a scene file, or nested tables; its unbalances are `loads.unbalance` and masses beside
+        scene: scene, path of a scene file, or nested tables; its unbalances are `loads.unbalance` and masses off
             the axis.
         speeds: rad/s, increasing, or a text "first:last:number" with a unit.
         probes: pairs of a place (m) and an angle (rad) from direction 2 towards direction 3 that a probe looks along.

@@ -20,7 +20,7 @@ from rotfem.equations.hub import HubRow
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
 from rotfem.equations.system import Instant, System
-from rotfem.errors import ComputationError
+from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.time_signals import View, viewed
 from rotfem.numerics.projection import bordered
@@ -37,6 +37,9 @@ def compile_system(
     A system that is not `moving`, of steady states and modes, needs fewer forms; effects can be left out of one that is
     `parted`, or moving.
     """
+    if moving and any(support.of_frequency for support in getattr(problem.structure, "supports", ())):
+        why = "depend on the frequency of whirl, which a history does not have; modes, campbell and unbalance take them"
+        raise InputError("structure.supports", None, why)
     view = View()
     seen, signals = viewed(problem.pushed(), view) if moving else (problem, [])
     model = Model(seen, comm)

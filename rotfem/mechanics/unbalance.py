@@ -64,11 +64,11 @@ class Unbalance:
 
 
 def unbalances(structure: Any, given: Sequence[Any] = ()) -> tuple[Unbalance, ...]:
-    """Return the unbalances of a shaft: of its masses beside the axis, and of a scene's table."""
+    """Return the unbalances of a shaft: of its masses off the axis, and of a scene's table."""
     masses = [(m.x, m.mass, m.offset) for m in getattr(structure, "masses", ())]
     masses.append((structure.length, structure.tip_mass, getattr(structure, "tip_offset", (0.0, 0.0, 0.0))))
-    beside = [Unbalance(x, mass * hypot(y, z), atan2(z, y)) for x, mass, (_, y, z) in masses if mass * hypot(y, z) > 0]
-    return (*beside, *(Unbalance(u.x, u.moment, u.phase, u.start) for u in given))
+    own = [Unbalance(x, mass * hypot(y, z), atan2(z, y)) for x, mass, (_, y, z) in masses if mass * hypot(y, z) > 0]
+    return (*own, *(Unbalance(u.x, u.moment, u.phase, u.start) for u in given))
 
 
 def pushed(loads: Loads, found: Sequence[Unbalance], motion: Motion, turning: bool) -> Loads:

@@ -141,7 +141,7 @@ class PointMass(SceneModel):
         round_body = [data.pop(name, None) for name in ("polar_inertia", "transverse_inertia")]
         if round_body != [None, None]:
             if None in round_body or "inertia" in data:
-                raise problem("polar_inertia", None, "needs transverse_inertia, and no inertia beside them")
+                raise problem("polar_inertia", None, "needs transverse_inertia, and no inertia with them")
             polar, across = round_body
             data["inertia"] = [[polar, 0, 0], [0, across, 0], [0, 0, across]]
         return data
@@ -338,7 +338,7 @@ class SpatialBeamStructure(BeamStructure):
     def is_round(self) -> bool:
         """Whether it is straight, and stiffness and inertia are the same in all directions about it.
 
-        Masses beside the axis are unbalance, no asymmetry.
+        Masses off the axis are unbalance, no asymmetry.
         """
         if not self.is_straight or self.hinges or self.pitches:
             return False
@@ -354,7 +354,7 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def has_fibers(self) -> bool:
-        """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
+        """Whether the sections have fibers off the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0
 
     @classmethod

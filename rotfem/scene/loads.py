@@ -345,7 +345,7 @@ class PointLoad(SceneModel):
 
 
 class UnbalanceTable(SceneModel):
-    """One table of [[loads.unbalance]]: a mass beside the axis of a shaft, as mass times distance or as a grade.
+    """One table of [[loads.unbalance]]: a mass off the axis of a shaft, as mass times distance or as a grade.
 
     Attributes:
         x: place along the shaft (m).
@@ -389,7 +389,7 @@ class LoadsTable(SceneModel):
         distributed_moment: moment per length of a beam (N), or None.
         pressure: on a plate (N/m²), or None.
         at: forces and moments at places of the structure.
-        unbalance: masses beside the axis of a shaft.
+        unbalance: masses off the axis of a shaft.
     """
 
     gravity: Annotated[PaddedVector, unit("m/s**2")] = (0.0, 0.0, 0.0)

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag
 
 from rotfem.scene.files import FROM_FILE
@@ -44,7 +43,7 @@ Rows = tuple[tuple[Number, ...], ...]
 Over = Annotated[Rows, FROM_FILE, AfterValidator(lambda rows: check_increasing(_rows(rows, 1)))]
 
 
-class OverSpeed(SceneModel):
+class CoefficientTable(SceneModel):
     """A coefficient of a support over the speed of rotation and the frequency of whirl, by PCHIP; constant outside.
 
     Rows have the value of an isotropic support, or yy, zz, or yy, yz, zy, zz in their last columns.
@@ -123,7 +122,7 @@ def _coefficient(name: str) -> Any:
         return value if isinstance(value, list | tuple | SceneModel) else ((value, 0.0), (0.0, value))
 
     two_by_two = Annotated[tuple[tuple[NonNegative, Number], tuple[Number, NonNegative]], AfterValidator(_checked)]
-    ways = Annotated[two_by_two, Tag("<one>")] | Annotated[OverSpeed, Tag("<table>")]
+    ways = Annotated[two_by_two, Tag("<one>")] | Annotated[CoefficientTable, Tag("<table>")]
     kind = Discriminator(lambda value: "<one>" if isinstance(value, list | tuple) else "<table>")
     return Annotated[ways, kind, BeforeValidator(read)]
 
@@ -200,7 +199,7 @@ class SupportTable(SceneModel):
     @property
     def of_frequency(self) -> bool:
         """Whether it depends on the frequency of whirl."""
-        return any(isinstance(c, OverSpeed) and c.of_frequency for c in (*self.springs, *self.dampers))
+        return any(isinstance(c, CoefficientTable) and c.of_frequency for c in (*self.springs, *self.dampers))
 
     @property
     def couples(self) -> bool:
@@ -222,11 +221,4 @@ class SupportTable(SceneModel):
 
 def matrices(coefficient: Any) -> Array:
     """Return all matrices (n, 2, 2) that a coefficient may have."""
-    return coefficient.rows if isinstance(coefficient, OverSpeed) else np.array([coefficient], dtype=float)
-
-
-def matrix_at(coefficient: Any, speed: float, frequency: float) -> npt.NDArray[np.float64]:
-    """Return the matrix (2, 2) of a coefficient at a speed and a frequency of whirl (rad/s)."""
-    if isinstance(coefficient, OverSpeed):
-        return coefficient.at(speed, frequency)
-    return np.array(coefficient, dtype=float)
+    return coefficient.rows if isinstance(coefficient, CoefficientTable) else np.array([coefficient], dtype=float)

@@ -123,7 +123,7 @@ class Beam(Structure):
 
             self.section[name] = self.profile(name, values)
 
-    def beside(self, x: Array, near: Array) -> Array:
+    def at_sides(self, x: Array, near: Array) -> Array:
         """Return places x (m) of the span, those at a step of the section moved towards others, near them."""
         for step in self.data.section.steps:
             here = np.abs(x - step) < ONE * self.length
@@ -135,13 +135,13 @@ class Beam(Structure):
         if self._section.uniform:
             return self.constant(at(np.zeros(1))[0])
         return self.field(
-            name, lambda x, near: at(self.beside(x, near)), 4, valid=valid
+            name, lambda x, near: at(self.at_sides(x, near)), 4, valid=valid
         )  # that of I where dimensions taper
 
     def linear_field(self, name: str, at: Callable[[Array], Array], size: int, valid: Valid | None = None) -> Any:
         """Return the field of at(X), (n, size), that is linear between rows; of values (n,) where the size is 0."""
         return self.field(
-            name, lambda x, near: at(self.beside(x, near)), self.degree if len(self.inner_rows) else 1, size, valid
+            name, lambda x, near: at(self.at_sides(x, near)), self.degree if len(self.inner_rows) else 1, size, valid
         )
 
     def field(

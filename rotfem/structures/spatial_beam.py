@@ -429,7 +429,7 @@ class SpatialBeam(Beam):
         given, tensor = inertia
         out = []
         if mass > 0:
-            if self.problem.frame == "fixed":  # what is beside the axis turns: it is unbalance
+            if self.problem.frame == "fixed":  # what is off the axis turns: it is unbalance
                 offset = (offset[0], 0.0, 0.0)
             center = tuple(
                 self.scalar(f"{name}_offset_{i}", c) if c != 0.0 else 0 for i, c in enumerate(offset, start=1)
