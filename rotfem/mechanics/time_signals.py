@@ -108,7 +108,8 @@ class TimeSignal:
 
     def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
-        return polyval((t - 0.5 * (begin + end)) * (2 / (end - begin)), self._powers(begin, end, degree)).T
+        x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
+        return np.asarray(polyval(x, self._powers(begin, end, degree))).T
 
     def _powers(self, begin: float, end: float, degree: int) -> Array:
         """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
@@ -133,7 +134,7 @@ class TimeSignal:
         """Return the value at a time (s), evaluated as the view says."""
         if self.view.line is not None:
             begin, end, _ = self.view.line
-            value = polyval((2 * t - begin - end) / (end - begin), self._powers(*self.view.line))
+            value = np.asarray(polyval((2 * t - begin - end) / (end - begin), self._powers(*self.view.line)))
             return float(value[0]) if self._is_number else value
         return self.at(t + self.view.side * SAME * (abs(t) or SAME)) if self.view.side else self.at(t)
 
