@@ -109,7 +109,7 @@ class TimeSignal:
     def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
         x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
-        return np.asarray(polyval(x, self._powers(begin, end, degree))).T
+        return np.asarray(polyval(x, self._powers(begin, end, degree)), dtype=np.float64).T
 
     def _powers(self, begin: float, end: float, degree: int) -> Array:
         """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
