@@ -409,7 +409,7 @@ def test_unbalance_takes_energy_from_its_drive() -> None:
 
 @pytest.mark.parametrize("theory", ["reissner", "linear"])
 def test_bearings_carry_the_weight(theory: str) -> None:
-    """Statics: 60 and 40 % of the weight for a disk at 0.4 of the span, and the moment of a tilting bearing; 1e-4, the shaft itself."""
+    """60 and 40 % of a disk at 0.4 of the span, and a tilting bearing's moment; 1e-4, the shaft itself."""
     scene = shaft_on_bearings(2e4, 100.0, loads={"gravity": [0, -9.81, 0]}, model={"theory": theory})
     scene["structure"]["masses"][0]["x"] = 0.4
     history = rotfem.run(scene).history
