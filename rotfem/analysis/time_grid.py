@@ -107,7 +107,7 @@ def knots_of(
 
 def unresolved(signal: TimeSignal, times: Array) -> Array:
     """Return the knots (s) of a signal that are rare, or in steps between times (s) in which it jumps or is bent."""
-    knots = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
+    knots: Array = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
     if RARE * len(knots) < len(times):
         return knots
     f, (before, after) = signal.values(times), (signal.values(knots * (1 + side * SAME)) for side in (-1, 1))
