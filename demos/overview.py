@@ -30,6 +30,8 @@ import rotfem
 
 SCENE = Path(__file__).with_name("spin_up.toml")
 
+REFERENCE = float(np.sqrt(6.0))  # of a string that its spin holds
+
 SHAFT: dict[str, Any] = {
     "structure": {
         "type": "spatial_beam",
@@ -63,7 +65,7 @@ def flaps(slenderness: float) -> list[float]:
 def main(figure: Path | None = None) -> float:
     """Return the second frequency of flap of the hair over its speed."""
     thin = flaps(1e6)
-    report("2nd flap of the hair over its speed", thin[1], np.sqrt(6.0), "")
+    report("2nd flap of the hair over its speed", thin[1], REFERENCE, "Ω")
     if figure is not None:
         draw(figure)
     return thin[1]
