@@ -227,7 +227,7 @@ class Recorder:
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
         pitch = () if system.motion.pitch is None else ("pitch",)
-        columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
+        columns = ("t", "psi", "psi_dot", *names, *energies, *root, *system.support_forces(), *free, *pitch)
         self._last: State | None = None
         self.snapshots = Snapshots() if output.fields else None
         self.stations = None if output.stations is None else StationRows(system, output)
@@ -252,6 +252,7 @@ class Recorder:
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
         row += system.root_reaction().values()
+        row += system.support_forces().values()
         row += hub_values(system, state).values()
         row += [] if motion.pitch is None else [motion.pitch.angle(t)]
         row += system.outputs().values()

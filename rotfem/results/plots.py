@@ -169,8 +169,8 @@ def history_figure(result: RunResult) -> Figure:
 
 def loads_figure(result: RunResult) -> Figure:
     """Return forces and moments of the hub on the root over time."""
-    loads = {name: values for name, values in result.history.items() if name.startswith("root_")}
-    return stacked("t", result.history["t"], loads, f"{heading(result)}, loads of the hub on the root")
+    loads = {name: values for name, values in result.history.items() if name.startswith(("root_", "support_"))}
+    return stacked("t", result.history["t"], loads, f"{heading(result)}, loads on the root and on supports")
 
 
 def shape_figure(result: RunResult) -> Figure:

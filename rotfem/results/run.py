@@ -64,7 +64,8 @@ class RunResult(Result):
     Attributes:
         summary: scene, versions, effects, timings, sizes, figures of merit; JSON-able.
         history: column ↦ values over time (`t` s, `psi` rad, `psi_dot` rad/s, `tip_u1` m, `tip_u2` m, `tip_alpha` rad,
-            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, …), in the frame; one row of a steady state.
+            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, `support_0_f2` N, …), in the frame; one row of
+            a steady state.
         shape: column ↦ values along the structure at the end (`x` m, of a plate `y` m too, `u1` m, …).
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
@@ -157,7 +158,7 @@ class RunResult(Result):
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit of a history: extremes of tip and root, with times, final values, Jacobi drift.
+    """Return the figures of merit: extremes of tip, root and supports, with times, final values, Jacobi drift.
 
     Extremes inside the history are those of the parabola through three neighbouring samples.
     """
@@ -165,7 +166,7 @@ def figures(history: dict[str, Array]) -> dict[str, float]:
     t = history["t"]
     if len(t) == 0:
         return out
-    for name in [n for n in history if n.startswith(("tip_", "root_"))]:
+    for name in [n for n in history if n.startswith(("tip_", "root_", "support_"))]:
         out[f"{name}_final"] = history[name][-1]
         if len(t) > 1:
             out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
