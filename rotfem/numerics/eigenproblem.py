@@ -242,7 +242,8 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
 def separate(pencil: Pencil, pairs: Eigenpairs, vectors: tuple[Array, Array], tell: Callable[..., Array]) -> None:
     """Choose the vectors of eigenvalues that are one, in place: orthogonal in M, and eigenvectors of another operator.
 
-    Without C, M and K symmetric, all right vectors are made real, of unit mass. Left ones follow: y_i^H [(λ_i + λ_j) M + C] x_j is 1 or 0.
+    Without C, and with M and K symmetric, all right vectors are made real, of unit mass. Left ones follow, so that
+    y_i^H [(λ_i + λ_j) M + C] x_j is 1 or 0.
 
     Args:
         pencil: M, C and K.

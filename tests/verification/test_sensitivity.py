@@ -125,7 +125,7 @@ def test_pairs_of_one_frequency() -> None:
 
 
 def test_pair_that_a_parameter_mixes() -> None:
-    """Sections turned by half a radian: the axes of the pair are others than those of the shapes; dω/dEI2 is still ω/2 and 0."""
+    """Sections turned by half a radian: the axes of the pair are not those of shapes; dω/dEI2 is still ω/2 and 0."""
     section = {"EA": 1e8, "GA2": 3e7, "GA3": 3e7, "GJ": 0.77, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0}
     section |= {"rotary_inertia2": 1e-8, "rotary_inertia3": 1e-8}
     structure = {"type": "spatial_beam", "length": 1.0, "section": section, "pretwist": [[0.0, 0.5], [1.0, 0.5]]}
