@@ -20,9 +20,9 @@ from rotfem.scene.values import (
     PaddedVector,
     Positive,
     Rows,
-    check_increasing,
     check_on_span,
     check_span,
+    check_times,
 )
 
 
@@ -76,7 +76,7 @@ def check_grid(rows: Matrix) -> Matrix:
 
 #: What a table is over ↦ what checks its rows.
 CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {
-    ("t",): check_increasing,
+    ("t",): check_times,
     ("x",): check_span,
     ("x", "t"): check_grid,
 }

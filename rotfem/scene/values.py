@@ -57,6 +57,10 @@ Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 Rows = tuple[tuple[Number, ...], ...]
 
 
+#: Length of a jump in time, as a part of the largest time of its table.
+JUMP = 1e-11
+
+
 def check_increasing(rows: Any) -> Any:
     """Return rows; refuse fewer than two of them, and a first column that does not increase strictly."""
     if isinstance(rows, float):
@@ -67,6 +71,23 @@ def check_increasing(rows: Any) -> Any:
         if after <= before:
             raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} ≤ {before:g}")
     return rows
+
+
+def check_times(rows: Any) -> Any:
+    """Return rows (t, …); refuse t (s) that decreases, or does not change; two rows of one t are a jump.
+
+    They, and rows closer than that, are moved JUMP of the largest |t| apart: a ramp whose integrals keep their digits.
+    """
+    t = [row[0] for row in rows]
+    if len(rows) < 2 or t[0] == t[-1]:
+        raise problem("", None, "must have at least two rows at different t")
+    out, width = [rows[0]], JUMP * max(abs(t[0]), abs(t[-1]))
+    for i, row in enumerate(rows[1:], start=1):
+        if t[i] < t[i - 1] or (i > 1 and t[i] == t[i - 2]):
+            why = "the first column must increase, or stand in two rows where the table jumps"
+            raise problem("", None, f"{why}; row {i + 1}: {t[i]:g} after {t[i - 1]:g}")
+        out.append((max(t[i], out[-1][0] + width), *row[1:]))
+    return tuple(out)
 
 
 def check_span(rows: Any) -> Any:
@@ -107,8 +128,8 @@ Span = Annotated[
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
 #: A number, or a taper from x = 0, in which two rows of one x are a step.
 Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start)]
-#: Rows (t, value), t (s) strictly increasing.
-TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_increasing)]
+#: Rows (t, value), t (s) increasing.
+TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_times)]
 
 
 def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:

@@ -55,7 +55,8 @@ def test_rows_that_are_meant_are_read(tmp_path: Path, content: str) -> None:
         ("", "has no row of numbers"),
         ("0;0\n1;1\n", 'line 2, column 1: "1;1" must be'),
         ("t,w,a\n# rig\n0,0,0\n1,1,1\n", "[0.0, 0.0, 0.0]: must have at most 2 entries"),
-        ("0,0\n1,5\n# back\n1,6\n", "the first column must increase strictly; row 3: 1 ≤ 1"),
+        ("0,0\n1,5\n# back\n0.5,6\n", "or stand in two rows where the table jumps; row 3: 0.5 after 1"),
+        ("0,0\n1,5\n1,6\n1,7\n", "row 4: 1 after 1"),
         ("t,w\n0,0\n", "must have at least two rows"),
     ],
 )
