@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
@@ -19,7 +19,7 @@ from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import LoadsTable, check_loads
+from rotfem.scene.loads import LoadsTable, check_in_plane, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
     AngularUnit,
@@ -96,10 +96,6 @@ class Scene(SceneModel):
         accuracy_of: its output; by default that of the command, the tip or the frequencies.
         accuracy_budget: limit of the CPU time (s) of all answers together; none by default.
     """
-
-    GONE: ClassVar[Mapping[str, str]] = {
-        "limits": "leave it out: only memory is limited, by the environment variable ROTFEM_MEMORY (GB)"
-    }
 
     structure: Structure
     motion: AnyMotion
@@ -228,7 +224,7 @@ class Scene(SceneModel):
             if support.frame == "fixed" and any(motion.axis[1:]):
                 why = "is of a beam that spins about its own axis; those of others stand in the rotating frame"
                 raise problem(f"structure.supports.{i}.frame", "fixed", why)
-        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_loads(structure, motion.is_free, self.loads)
         check_mesh(structure, self.mesh)
         check_theory(structure, model)
         check_frame(structure, motion, model)
@@ -291,14 +287,9 @@ def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    forces: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not name.endswith("moment")}
-    for key, signal in forces.items():
-        if signal is not None and any(len(vector) > 2 and vector[2] != 0.0 for _, vector in signal.vectors):
-            value = list(signal.value) if signal.value is not None else None
-            raise problem(key, value, "the third component must be 0 for a planar_beam")
-    if loads.gravity[2] != 0.0:
-        raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
+    check_in_plane("loads.gravity", [(None, loads.gravity)])
+    if motion.base_acceleration is not None:
+        check_in_plane("motion.base_acceleration", motion.base_acceleration.vectors)
 
 
 def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:

@@ -34,7 +34,6 @@ structure.tip_mass=-1 -> at least 0
 structure.hub_offset=[0,0,0] -> unknown key
 structure.section.EA=false -> must be a number
 structure.section.EA=[[0,1],[9,1]] -> it ends at 9
-structure.section.EA=[[0,1],[5,1],[5.0000001,2],[10,2]] -> apart
 structure.type='planar_baem' -> did you mean "planar_beam"?
 structure={} -> @structure.type required key is missing
 structure=3 -> must be a table
@@ -91,7 +90,7 @@ time={end=1.0, step=0.1, scheme='newmark', beta=0} -> @time.beta greater than 0
 time={end=1.0, step=0.1, output_every=0} -> @time.output_every at least 1
 time={end=1.0, step=0.1, scheme='rk4'} -> @time.scheme "generalised_alpha", "newmark", "energy_conserving", "esdirk4"
 modes.count=0 -> at least 1
-modes.about='deformed' -> "undeformed"
+modes.about='deformed' -> 'undeformed'
 structure.section.EA=[] -> at least two rows
 structure.section.EA=[[0.1,1],[2,1]] -> must start at x = 0
 structure.section.EA=[[0,1],[1.2,1],[1,2],[2,2]] -> must not decrease
@@ -99,7 +98,7 @@ structure.section.EA=[[0,1],[2,0]] -> greater than 0
 structure.section.EA=[[0,1],[2, nan]] -> finite
 structure.section.EA=[[0,1],[2, true]] -> must be a number
 structure.section.EA=[[0,1],[2]] -> more entries than 1
-structure.section.EA=[[0,1,2],[2,1,2]] -> at most 2 entries
+structure.section.EA=[[0,1,2],[2,1,2]] -> at most 2 items
 structure.section.EA=[0,1] -> must be a list
 structure.section={} -> none is given
 structure.section={EA=1, GA=1, EI=1} -> missing mass_per_length
@@ -112,7 +111,6 @@ loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> @loads.distributed.over_sp
 loads={distributed={over_span=[[0,0],[10,1]]}} -> row 1 has 2 entries
 loads={distributed={over_span=[[0,0,0],[5,0,1]], value=[0,1]}} -> exactly one of
 loads={distributed={over_span=[[0,0,0],[5,0,1],[4,0,1]]}} -> row 3: 4 < 5
-loads={distributed={over_span=[[0,0,0],[5,0,1],[5,0,1],[5,0,1]]}} -> 3 rows
 loads={distributed={over_span_and_time=[[0,0,0,1],[5,0,0,1],[0,1,0,1]]}} -> no row for x = 5, t = 1
 loads={distributed={over_span=[[0,0,0,1],[5,0,0,1]]}} -> third component
 loads={tip_force={over_span=[[0,0,0],[5,0,1]]}} -> unknown key
@@ -124,7 +122,6 @@ loads={at={x=1.0, force=[0,1]}} -> must be a list
 loads={tip_force={harmonic={amplitude=[0,1]}}} -> frequency and per_rev
 loads={tip_force={harmonic={frequency=1.0}}} -> amplitude
 loads={tip_moment={harmonic={amplitude=1.0, per_rev=2}}}; motion={type='torque', hub_inertia=1} -> @loads prescribed
-limits={steps=7} -> ROTFEM_MEMORY
 structure.supports={} -> unknown key
 output={stations=[2,1]} -> @output.stations increase
 modes.operating=[3,2] -> increase
@@ -152,7 +149,7 @@ structure.masses=[{x=9, mass=1}] -> @structure.masses.0.x from 0 to the length
 model.frame='inertial' -> planar_beam
 initial.tip_displacement=0.1 -> only for a planar_beam
 loads.tip_moment=1 -> three components
-mesh.cell='triangel' -> did you mean "triangle"?
+mesh.cell='triangel' -> 'quadrilateral' or 'triangle'
 mesh.elements=[2,0] -> @mesh.elements.1 at least 1
 structure.nu=0.5 -> less than 0.5
 structure.E1=1000000000.0 -> @structure cannot be combined

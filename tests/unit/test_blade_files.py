@@ -130,7 +130,7 @@ KEYS |= {"set": {"set": [1, 2]}, "tower": {"body": "tower"}, "none": {"body": "b
 
 #: A file, keys that the scene has beside it, a text in the file => another one, and words of what the error says.
 BAD = r"""
-elastodyn.dat length rigid | 3.000000e+08 => 3.0x8 | line 14, column 5: "3.0x8" must be a finite
+elastodyn.dat length rigid | 3.000000e+08 => 3.0x8 | line 14, column 5: must be a finite
 elastodyn.dat length rigid | 3.000000e+08 => -3e8 | line 14, column 5: FlpStff must be greater than 0
 elastodyn.dat length rigid | 1.000000 0.25 => 0.900000 0.25 | line 15, column 1: BlFract must end at 1
 elastodyn.dat length rigid | EdgStff\n => EdgeStff\n | line 12, column 6: the column "EdgeStff" is not known
@@ -143,7 +143,7 @@ beamdyn.dat length | 2   station => 3   station | ends before station 3 is compl
 beamdyn.dat length |  1.000000 =>  0.900000 | the stations must end at 1, not at 0.9
 beamdyn.dat length |  0.000000 =>  0.100000 | line 11, column 1: the stations must start at 0
 beamdyn.dat length | 5.0000 => 5.0, | must be a finite number
-beamdyn.dat length | 2   station => two   station | line 4, column 1: station_total is "two"
+beamdyn.dat length | 2   station => two   station | line 4, column 1: station_total must be
 beamdyn.dat |  | BeamDyn's primary file has the line
 bmodes.dat length stiff | 2  n_secs => 1  n_secs | line 2, column 1: n_secs
 bmodes.dat length stiff | tc_offst => te_offst | line 4, column 13: the column "te_offst" is not known
@@ -175,7 +175,7 @@ two.yaml | mass: [ => mass: [- | inertia_matrix.mass must be finite numbers grea
 two.yaml | K44:  => K55:  | has no K44
 two.yaml hub |  | hub_offset: given twice
 main.fst | 2   Comp => 3   Comp | line 4, column 1: CompElast = 3 is not known; known: 1
-main.fst | 2   Comp => two   Comp | line 4, column 1: CompElast is "two"; must be a whole number
+main.fst | 2   Comp => two   Comp | line 4, column 1: CompElast must be a whole number
 main.fst | main.dat => none.dat | line 6: there is no file "none.dat" beside it
 main.fst | main.dat => elastodyn.dat | no line with a value of TipMass
 main.fst | primary.dat =>  | line 7: there is no file "" beside it
@@ -197,7 +197,7 @@ main.htc one | type        timo => type        notimo | line 10, column 2: the t
 main.htc one | FPM 1 => FPM 0 | line 6: has 30 columns; must be 19 with centres, as FPM 0
 main.htc one | nsec 2 => nsec 3 | line 18, column 2: nsec is 3, at least 2, and there are 2 lines of sec
 main.htc one | sec 2 0.02 => sec 3 0.02 | line 20: must be sec, its number, 2, x, y, z and twist
-main.htc one | sec 2 0.02 => sec 2 0.x2 | line 20, column 3: "0.x2" must be a finite number
+main.htc one | sec 2 0.02 => sec 2 0.x2 | line 20, column 3: must be a finite number
 main.htc one | -0.01 20.000000 => 20.000000 | line 20: must be sec, its number, 2, x, y, z and twist: 6 columns, not 5
 main.htc one | full.st => none.st | line 13, column 2: there is no file "./none.st"
 main.htc one | set 1 1 => set 1 2 | allowed: [1, 1]
@@ -207,7 +207,7 @@ main.htc one | begin c2_def; =>  | line 27: an end without a begin
 main.htc two | copy_main_body blade1 => copy_main_body blade2 | copy each other in a circle
 main.dat rigid | HubRad  => HubRadius  | no line with a value of HubRad
 main.dat rigid | \n1.5  => \n31.5  | line 6, column 1: HubRad = 31.5 must be at least 0 and less than TipRad = 21.5
-main.dat rigid | -4.0 => four | line 7, column 1: "four" must be a finite number
+main.dat rigid | -4.0 => four | line 7, column 1: must be a finite number
 main.dat rigid | 7.0  => -7.0  | line 10, column 1: TipMass(1) = -7 must be at least 0
 main.dat rigid | BldFile1 => BldFile | no line with a value of BldFile(1)
 """

@@ -262,12 +262,6 @@ def test_message_shows_file_key_value_and_what_is_allowed() -> None:
     )
 
 
-def test_a_key_that_went_says_so() -> None:
-    assert str(refused(model__reduced=True)).startswith(
-        "test.toml: model.reduced: unknown key; reduced models went with"
-    )
-
-
 def test_all_problems_are_listed() -> None:
     error = refused(structure__length=-1.0, mesh__elements=0, model__theory="x")
     assert [problem.key for problem in error.problems] == ["structure.length", "model.theory", "mesh.elements"]

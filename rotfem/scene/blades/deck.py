@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
-from rotfem.scene.files import Unreadable, number_in, read_bytes, shown_cell
+from rotfem.scene.files import Unreadable, number_in, read_bytes
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
 from rotfem.scene.table import as_name, in_units, problem, problems_at
 from rotfem.scene.values import DIGITS, Array
@@ -115,14 +115,14 @@ class Deck:
         """Return the whole number of the line `value  name …`, at least so many."""
         line, text = self.named(name)
         if not text.isdecimal() or int(text) < least:
-            self.fail(f"{name} is {shown_cell(text)}; must be a whole number, at least {least}", line, 1)
+            self.fail(f"{name} must be a whole number, at least {least}", line, 1)
         return int(text)
 
     def value(self, text: str, line: int, column: int) -> float:
         """Return a word as a finite number; exponents may have Fortran's D."""
         number = number_in(re.sub(r"[dD]", "e", text))
         if number is None or not math.isfinite(number):
-            self.fail(f"{shown_cell(text)} must be a finite number", line, column)
+            self.fail("must be a finite number", line, column)
         return number
 
     def row(self, line: int, columns: int) -> list[float]:
