@@ -88,8 +88,7 @@ class Problem:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         object.__setattr__(self, "mesh", self.mesh.suited(self.structure))
         if not self.theory.holds_for(self.structure.type):
-            kinds = ", ".join(self.theory.strains)
-            why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
+            why = f"has strains for {', '.join(self.theory.strains)}, none for a {self.structure.type}"
             raise InputError("model.theory", self.theory.name, why)
         if self.frame == "auto":
             object.__setattr__(self, "frame", "fixed" if self.is_shaft else "rotating")
@@ -105,8 +104,14 @@ class Problem:
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
         if self.frame == "inertial" and not flat_and_exact:
-            why = "needs a planar_beam, a theory that holds for any displacement, and a prescribed rotation"
+            exact = " or ".join(theory.name for theory in Theory.registry if theory.exact)
+            why = f"needs a planar_beam, a theory that holds for any displacement ({exact}), and a prescribed rotation"
             raise InputError("model.frame", self.frame, why)
+        if self.frame == "inertial" and (self.structure.damping.mass_rate or self.structure.damping.has_modal):
+            why = "by mass would brake the revolution itself in the inertial frame, and modes at rest turn there"
+            raise InputError("structure.damping", None, f'{why}; use model.frame = "rotating"')
+        if self.motion.hub is not None and getattr(self.structure, "pitches", False):
+            raise InputError("structure.root.pitch", None, "over time needs a speed that is prescribed, no torque")
         if self.prestress not in (None, "axial", "all"):
             raise InputError("model.prestress", self.prestress, "allowed: axial, all")
         for name in self.terms:

@@ -130,15 +130,6 @@ class DampingTable(SceneModel):
         families = self.modal.values() if isinstance(self.modal, dict) else [self.modal]
         return any(bool(np.any(np.asarray(ratios))) for ratios in families)
 
-    def check_inertial(self) -> None:
-        """Refuse what has no meaning in the inertial frame."""
-        if self.mass_rate > 0.0:
-            why = 'must be 0 with frame = "inertial", where it would brake the revolution itself'
-            raise problem("structure.damping.rayleigh", list(self.rayleigh), f"the mass-proportional part {why}")
-        if self.has_modal:
-            why = 'is not available with frame = "inertial", where the modes at rest turn; use "rotating"'
-            raise problem("structure.damping.modal", self.modal, why)
-
 
 # --- root and supports of beams ---------------------------------------------------------------------------------------
 

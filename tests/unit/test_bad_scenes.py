@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import tomli_w
 
+import rotfem
 from rotfem import SceneError
 from rotfem.scene import load_scene
 from tests.beams import STRUCTURE
@@ -60,8 +61,7 @@ model.effects=['euler', 'euler'] -> twice
 model.effects='all' -> a list of coriolis
 accuracy=0.001; output={error=false} -> @output.error cannot be combined with accuracy
 model={frame='inertial', theory='linear'} -> @model.frame reissner
-model.frame='inertial'; motion={type='torque', hub_inertia=1.0} -> @model.frame torque
-model={frame='inertial', effects=['euler']} -> @model.effects clamp
+model.frame='inertial'; motion={type='torque', hub_inertia=1.0} -> @model.frame prescribed rotation
 initial.tip_displacement=-10.0 -> less than the length
 initial={tip_displacement=0.1, state='steady'} -> @initial.tip_displacement cannot be combined
 loads.gravity=[0,0,-9.81] -> third component
@@ -182,6 +182,6 @@ def test_bad_scenes(tmp_path: Path, kind: str, overrides: list[str], key: str, w
     path.write_text(tomli_w.dumps({"structure": STRUCTURES[kind], "motion": {"type": "constant", "speed": 3.0}}))
     load_scene(path)
     with pytest.raises(SceneError, match=re.escape(words)) as caught:
-        load_scene(path, overrides)
+        rotfem.Problem.of(load_scene(path, overrides))
     assert str(caught.value).startswith("test.toml: ")
     assert caught.value.key == key or caught.value.key.startswith(f"{key}.")

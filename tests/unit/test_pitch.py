@@ -86,7 +86,7 @@ def test_units() -> None:
 )
 def test_refused(pitch: Any, more: dict[str, Any], key: str) -> None:
     with pytest.raises(SceneError) as caught:
-        scene(pitch, **more)
+        Problem.of(scene(pitch, **more))
     assert caught.value.key.startswith(key)
 
 
