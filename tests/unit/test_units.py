@@ -66,7 +66,7 @@ def test_scene_in_units_is_that_in_si():
             "tip_force": {"over_time": [[0, 0, 0], ["1 min", "1 kN", 3]], "kind": "follower"},
             "tip_moment": "2 Nm",
         },
-        "tip_force": {"over_time": [[0, 0, 0], ["1 min", "1 kN", 3]], "kind": "follower"},
+        "time": {"end": "2 min", "step": "10 ms"},
     }
     scene = Scene.from_dict(tables)
     assert scene.structure.length == 10.0
