@@ -23,7 +23,7 @@ from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
 from rotfem.mechanics.loads import Loads, load_of
-from rotfem.mechanics.motion import Motion, no_acceleration
+from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
@@ -295,16 +295,11 @@ def scheme_of(time: Time) -> Scheme:
 def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
-    given = m.base_acceleration
+    given, more = m.base_acceleration, dict[str, Any]()
     base = None if given is None else load_of("motion.base_acceleration", given, scene.structure, float)
-    more = {
-        "base_acceleration": no_acceleration if base is None else base.at,
-        "is_accelerated": base is not None and not base.is_zero,
-        "base_knots": base.knots if base is not None and base.linear else None,
-    }
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
-    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
+    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, "base": base, **more})
     if base is not None and not base.constant:
         motion = replace(motion, constant=False)
     return with_pitch(scene, motion) if scene.structure.pitches else motion

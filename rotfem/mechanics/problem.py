@@ -236,7 +236,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     """Return in which directions (3,) polar and axial vectors may drive a problem at any time, frame components."""
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
-    polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
+    polar = (_of_load(motion.base) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
     axial = (np.asarray(motion.axis) != 0.0) & moved
     for name, load in loads.named.items():
         which = _of_load(load) != 0.0
@@ -244,21 +244,11 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     return polar, axial
 
 
-def _of_load(load: Load) -> Array:
+def _of_load(load: Load | None) -> Array:
     """Return the largest size of each component of a load over all times, shape (3,); infinite where it is unknown."""
-    values = np.zeros(3) if load.is_zero else load.sizes()
+    values = np.zeros(3) if load is None or load.is_zero else load.sizes()
     if values is None:
         return np.full(3, np.inf)
     if len(values) == 1:  # about axis 3, or along it
         return np.array([0.0, 0.0, values[0]])
     return np.concatenate([values, np.zeros(3 - len(values))])
-
-
-def _of_base(motion: Any) -> Array:
-    """Return the same of the base acceleration, which is linear between its knots."""
-    if not motion.is_accelerated:
-        return np.zeros(3)
-    times = (0.0,) if motion.constant else motion.base_knots
-    if times is None:
-        return np.full(3, np.inf)
-    return np.asarray(np.abs([motion.base_acceleration(t) for t in (0.0, *times)]).max(axis=0))

@@ -59,11 +59,6 @@ Length = Annotated[NonNegative, unit("m")]
 Mass = Annotated[NonNegative, unit("kg")]
 
 
-def _as_matrix(inertia: float | Matrix) -> Array:
-    """Return an inertia tensor (kg·m²), shape (3, 3), of one that may be isotropic."""
-    return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
-
-
 class DiskTable(SceneModel):
     """A disk on a shaft.
 
@@ -120,7 +115,7 @@ class PointMass(SceneModel):
     @property
     def inertia_matrix(self) -> Array:
         """Inertia tensor (kg·m²), shape (3, 3)."""
-        return _as_matrix(self.inertia)
+        return self.inertia * np.eye(3) if isinstance(self.inertia, float) else np.array(self.inertia)
 
     @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
@@ -204,9 +199,17 @@ class BeamStructure(StructureTable):
         return isinstance(self.root, SpatialRoot) and self.root.pitch.changes
 
     @property
+    def bodies(self) -> dict[str, PointMass]:
+        """Name ↦ rigid body fixed to a section: that at the tip and the masses along the beam."""
+        tip = {"x": self.length, "mass": self.tip_mass, "inertia": self.tip_inertia}
+        offset = getattr(self, "tip_offset", (0.0, 0.0, 0.0))
+        named = {"tip": PointMass.model_construct(**tip, offset=offset)}
+        return named | {f"masses_{i}": body for i, body in enumerate(self.masses)}
+
+    @property
     def has_tip_mass(self) -> bool:
         """Whether there is anything at the tip, or at another point, that has inertia."""
-        return self.tip_mass > 0.0 or bool(np.any(_as_matrix(self.tip_inertia))) or bool(self.masses)
+        return any(body.mass > 0.0 or bool(np.any(body.inertia_matrix)) for body in self.bodies.values())
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -314,11 +317,6 @@ class SpatialBeamStructure(BeamStructure):
         )
 
     @property
-    def tip_inertia_matrix(self) -> Array:
-        """Inertia tensor of the tip mass (kg·m²), shape (3, 3)."""
-        return _as_matrix(self.tip_inertia)
-
-    @property
     def root_position(self) -> tuple[float, float, float]:
         """Position of the root in the frame (m): the hub offset, or (hub radius, 0, 0), and the hinge offset."""
         x, y, z = self.hub_offset if self.hub_offset is not None else (self.hub_radius, 0.0, 0.0)
@@ -344,7 +342,7 @@ class SpatialBeamStructure(BeamStructure):
             return False
         places = np.union1d(self.section.knots, self.length)
         places = np.union1d(places, (places[1:] + places[:-1]) / 2)
-        bodies = [self.tip_inertia_matrix, *(m.inertia_matrix for m in self.masses)]
+        bodies = (body.inertia_matrix for body in self.bodies.values())
         return all(map(same_about_axis, (*self.section.at(places).values(), *bodies)))
 
     @property
