@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Tag, TypeAdapter, ValidationError, ValidationInfo
 
 from rotfem.along import apart
 from rotfem.scene.blades.deck import Asked, keys_of
@@ -142,17 +141,10 @@ class PointMass(SceneModel):
         return data
 
 
-def _three(value: Any) -> Any:
-    """Return a vector; refuse one of two numbers, which may be meant along the axis or across it."""
-    if isinstance(value, list | tuple) and len(value) == 2:
-        raise problem("", list(value), "must be [x, y, z]: along the beam, and both directions across it")
-    return value
-
-
 class SpatialPointMass(PointMass):
     """A rigid body fixed to a section of a spatial beam."""
 
-    offset: Annotated[Vector, BeforeValidator(_three), unit("m")] = (0.0, 0.0, 0.0)
+    offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
 
 
 class BeamStructure(StructureTable):
@@ -201,10 +193,9 @@ class BeamStructure(StructureTable):
     @property
     def bodies(self) -> dict[str, PointMass]:
         """Name ↦ rigid body fixed to a section: that at the tip and the masses along the beam."""
-        tip = {"x": self.length, "mass": self.tip_mass, "inertia": self.tip_inertia}
-        offset = getattr(self, "tip_offset", (0.0, 0.0, 0.0))
-        named = {"tip": PointMass.model_construct(**tip, offset=offset)}
-        return named | {f"masses_{i}": body for i, body in enumerate(self.masses)}
+        tip: dict[str, Any] = {"x": self.length, "mass": self.tip_mass, "inertia": self.tip_inertia}
+        tip["offset"] = getattr(self, "tip_offset", (0.0, 0.0, 0.0))
+        return {"tip": PointMass.model_construct(**tip)} | {f"masses_{i}": body for i, body in enumerate(self.masses)}
 
     @property
     def has_tip_mass(self) -> bool:
@@ -368,13 +359,11 @@ class SpatialBeamStructure(BeamStructure):
         data = _with_length(data, info)
         if not isinstance(section, Mapping):
             return data
-        section, lifted = with_columns(section, info, "section."), dict[str, Any]()
-        for key in {"pretwist", "precone"} & section.keys():
-            if key in data:
-                raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
-            with problems_at(f"section.{key}", section[key]):
-                lifted[key] = _reader(key).validate_python(section[key], context=info.context)
-        return {**data, **lifted, "section": {key: value for key, value in section.items() if key not in lifted}}
+        section = with_columns(section, info, "section.")
+        lifted: dict[str, Any] = {key: section.pop(key) for key in ("pretwist", "precone") if key in section}
+        for key in lifted.keys() & data.keys():
+            raise problem(f"section.{key}", None, f"given twice; structure.{key} is also set")
+        return {**data, **lifted, "section": section}
 
     def _check(self) -> None:
         slack = ROUND_OFF if self.line is None else DIGITS
@@ -422,16 +411,14 @@ else:
     Structure = Annotated[Any, one_of(_TYPES)]
 
 
-@cache
-def _reader(key: str) -> TypeAdapter[Any]:
-    """Return what reads the value of a key of a spatial beam before the whole table is read."""
-    return TypeAdapter(get_type_hints(SpatialBeamStructure, include_extras=True)[key])
+#: What reads the line before the whole table is read.
+_LINE = TypeAdapter[Any](Line | None, config=ConfigDict(defer_build=True))
 
 
 def _with_length(data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
     """Return the table with the arc length of its line as its length; raise if another one is given."""
     try:
-        rows = _reader("line").validate_python(data.get("line"), context=info.context)
+        rows = _LINE.validate_python(data.get("line"), context=info.context)
     except ValidationError:
         return {**data, "length": 1.0}  # the error of the line is reported at its key
     if rows is None:

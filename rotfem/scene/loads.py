@@ -6,7 +6,6 @@ Loads are gravity, and forces and moments at the tip, along the structure, and a
 from __future__ import annotations
 
 import inspect
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -60,16 +59,9 @@ def are_rows(value: Any) -> bool:
 
 def check_grid(rows: Matrix) -> Matrix:
     """Return rows (x, t, …); refuse them unless every x (m), at least two, stands once with every t (s)."""
-    found = Counter((x, t) for x, t, *_ in rows)
-    (x, t), times = found.most_common(1)[0] if found else ((0.0, 0.0), 0)
-    if times > 1:
-        raise problem("", None, f"{times} rows give x = {x:g}, t = {t:g}")
-    stations, moments = (sorted({pair[k] for pair in found}) for k in (0, 1))
-    if len(stations) < 2 or len(moments) < 2:
-        raise problem("", None, "must have at least two x and two t")
-    missing = next(((x, t) for x in stations for t in moments if (x, t) not in found), None)
-    if missing is not None:
-        raise problem("", None, f"has no row for x = {missing[0]:g}, t = {missing[1]:g}; must have every t at every x")
+    counts = [len({row[k] for row in rows}) for k in (0, 1)]
+    if min(counts) < 2 or not len(rows) == len({row[:2] for row in rows}) == counts[0] * counts[1]:
+        raise problem("", None, "must have every t at every x, each once, and at least two of both")
     return rows
 
 

@@ -268,15 +268,11 @@ class Time(WithParameters):
             raise problem("step", self.step, reason)
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
-        if self.step is not None and self.end + self.step == self.end:
-            raise problem("step", self.step, f"is lost in the round-off of time.end = {self.end:g}")
         if self.output_step is not None and self.output_every != 1:
             raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
         for key in ("max_step", "min_step"):
             if self.tolerance is None and getattr(self, key) is not None:
                 raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
-        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
-            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
 
 
 class ModesTable(SceneModel):

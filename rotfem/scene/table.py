@@ -73,8 +73,6 @@ def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> t
     for name in value:
         if name not in names:
             raise problem("", value, f"{show(name)} is not {kind}; {did_you_mean(name, names)}{allowed}")
-        if list(value).count(name) > 1:
-            raise problem("", value, f"{show(name)} is listed twice")
     return tuple(value)
 
 

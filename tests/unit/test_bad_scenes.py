@@ -48,16 +48,15 @@ motion.axis=[0,1,0] -> planar_beam
 motion.axis=[0,1] -> more entries
 motion.base_acceleration=[0,0,1] -> third component
 motion={type='spin_up', speed=6.0, duration=0} -> @motion.duration greater than 0
-motion={type='table', table=[[0,1],[0,2]]} -> @motion.table increase strictly
+motion={type='table', table=[[0,1],[1,1],[1,2]]} -> @motion.table increase strictly
 motion={type='table', table='no.csv'} -> @motion.table file not found
 motion={type='torque', hub_inertia=1.0, pulses=[[1,1,1]]} -> @motion.pulses must end after
-motion={type='torque', hub_inertia=1.0, pulses=[[0,1,1]], table=[[0,1],[1,1]]} -> @motion.table either
+motion={type='torque', hub_inertia=1.0, pulses=[[0,1,1]], table=[[0,1],[1,1]]} -> @motion.table give one of
 motion={type='torque', hub_inertia=1.0, coupled=1} -> @motion.coupled true or false
 motion={type='callable', speed=3.0} -> @motion.speed Python function
 model.theory='reisner' -> did you mean "reissner"?
 model.theory='exact' -> "consistent_linear"
 model.effects=['corolis'] -> did you mean "coriolis"?
-model.effects=['euler', 'euler'] -> twice
 model.effects='all' -> a list of coriolis
 accuracy=0.001; output={error=false} -> @output.error cannot be combined with accuracy
 model={frame='inertial', theory='linear'} -> @model.frame reissner
@@ -83,7 +82,6 @@ time={end=1.0, step=2} -> @time.step at most time.end
 time={end=1.0, step=0.1, max_step=1} -> @time.max_step only with tolerance
 time={end=1.0, step=0.1, breakpoints=[-1]} -> @time.breakpoints.0 at least 0
 time={end=1.0, step=0.1, breakpoints=0.5} -> @time.breakpoints must be a list
-time={end=1, tolerance=0.001, min_step=0.2, max_step=0.1} -> @time.min_step at most max_step
 time={end=1.0, step=0.1, beta=0.3} -> @time.beta no meaning
 time={end=1.0, step=0.1, scheme='newmark', gamma=0.4} -> @time.gamma at least 0.5
 time={end=1.0, step=0.1, scheme='newmark', beta=0} -> @time.beta greater than 0
@@ -91,7 +89,7 @@ time={end=1.0, step=0.1, output_every=0} -> @time.output_every at least 1
 time={end=1.0, step=0.1, scheme='rk4'} -> @time.scheme "generalised_alpha", "newmark", "energy_conserving", "esdirk4"
 modes.count=0 -> at least 1
 modes.about='deformed' -> 'undeformed'
-structure.section.EA=[] -> at least two rows
+structure.section.EA=[] -> at least two rows at different x
 structure.section.EA=[[0.1,1],[2,1]] -> must start at x = 0
 structure.section.EA=[[0,1],[1.2,1],[1,2],[2,2]] -> must not decrease
 structure.section.EA=[[0,1],[2,0]] -> greater than 0
@@ -111,7 +109,7 @@ loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> @loads.distributed.over_sp
 loads={distributed={over_span=[[0,0],[10,1]]}} -> row 1 has 2 entries
 loads={distributed={over_span=[[0,0,0],[5,0,1]], value=[0,1]}} -> exactly one of
 loads={distributed={over_span=[[0,0,0],[5,0,1],[4,0,1]]}} -> row 3: 4 < 5
-loads={distributed={over_span_and_time=[[0,0,0,1],[5,0,0,1],[0,1,0,1]]}} -> no row for x = 5, t = 1
+loads={distributed={over_span_and_time=[[0,0,0,1],[5,0,0,1],[0,1,0,1]]}} -> every t at every x
 loads={distributed={over_span=[[0,0,0,1],[5,0,0,1]]}} -> third component
 loads={tip_force={over_span=[[0,0,0],[5,0,1]]}} -> unknown key
 loads={pressure=1.0} -> needs a plate
@@ -130,7 +128,6 @@ structure.damping.modal={lag=[0.1,1.0]} -> @structure.damping.modal.lag.1 less t
 loads.tip_force.harmonic={amplitude=['a',1], frequency=1} -> @loads.tip_force.harmonic.0.amplitude must be a number
 structure.length.unit='m' -> @structure.length not a table
 structure.length=ten -> must be a number
-time={end=1.0, step=1e-20} -> @time.step round-off
 structure.section.EA=nofile.csv -> file not found
 structure.section.from='x.dat' -> unknown key
 [spatial]
@@ -138,7 +135,7 @@ structure.section.format='hawc2' -> unknown key
 loads.tip_moment=1 -> three components
 structure.tip_inertia=[[1,2,0],[2,1,0],[0,0,1]] -> definite
 structure.pretwist=[[0,0],[1,1]] -> it ends at 1
-structure.section.precone='a' -> must be a number
+structure.section.precone='a' -> @structure.precone must be a number
 structure.precone=0.1; structure.section.precone=0.1 -> given twice
 structure.hub_radius=1; structure.hub_offset=[1,0,0] -> either
 structure.section.mass_center=[0.1] -> more entries
