@@ -29,7 +29,7 @@ from numpy.linalg import norm
 from scipy.linalg import eigh
 from scipy.optimize import brentq, linear_sum_assignment
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.analysis.modal import ModalAnalysis, Spinning, correlation, stability
 from rotfem.analysis.reduced_basis import SpeedModel, between, with_errors
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
@@ -90,37 +90,6 @@ class SpeedPoint:
     def signed(self, branch: int) -> float:
         """Return ω of a branch (rad/s), negative from where it has passed zero."""
         return -self.value(branch).imag if self.conjugate[branch] else self.value(branch).imag
-
-
-def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
-    """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
-
-    With `conjugate` they are those of the modes at a with the modes of λ̄ at b: real matrices have both.
-
-    That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
-    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not
-    distinguished, for any combination of them is a mode too: what counts is how much of the other is in their span,
-    the trace of the product of both projections by the smaller dimension.
-    """
-    ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
-    la, lb = a.nonzero, b.nonzero
-    if conjugate:
-        yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
-    here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
-    own_a, own_b = a.own, b.own.conj() if conjugate else b.own
-    # The two products cancel the unknown scaling of x_b and y_b against each other.
-    scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
-    single = np.abs(here) * np.abs(there.T) / scale
-    groups = [repeated(lam, s.pairs.bounds) for lam, s in ((la, a), (lb, b))]
-    inverses = [np.diag(1.0 / np.where(d := own.diagonal(), d, np.inf)) for own in (own_a, own_b)]
-    for inverse, own, parts in zip(inverses, (own_a, own_b), groups, strict=True):
-        for i in (part for part in parts if len(part) > 1):
-            inverse[np.ix_(i, i)] = np.linalg.pinv(own[np.ix_(i, i)])
-    traces = (inverses[0] @ here @ inverses[1]) * there.T
-    firsts, sizes = ([[i[0] for i in parts] for parts in groups], [[len(i) for i in parts] for parts in groups])
-    sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
-    joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
-    return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
 
 
 def assign(point: SpeedPoint, following: SpeedPoint) -> None:

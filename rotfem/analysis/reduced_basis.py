@@ -268,5 +268,6 @@ def with_errors(analysis: ModalAnalysis, found: Spinning) -> Spinning:
     values, right, left = found.pairs.values, found.right, found.lifted(found.pairs.left)
     values, bounds = RoundOff(pencil).corrected(values, left, right)
     found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=backward_errors(pencil, values, right))
-    analysis.whirling(pencil, found.pairs, right, left)
+    separated = replace(found, pencil=pencil)
+    analysis.separate(separated)
     return found
