@@ -16,7 +16,7 @@ from rotfem.analysis.equilibrium import LargestState
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
-from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
+from rotfem.commands.fields import Snapshots, fields_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations
 from rotfem.equations.system import System
@@ -227,7 +227,7 @@ class Recorder:
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
         pitch = () if system.motion.pitch is None else ("pitch",)
-        columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
+        columns = ("t", "psi", "psi_dot", *names, *energies, *root, *system.support_forces(), *free, *pitch)
         self._last: State | None = None
         self.snapshots = Snapshots() if output.fields else None
         self.stations = None if output.stations is None else StationRows(system, output)
@@ -252,6 +252,7 @@ class Recorder:
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
         row += system.root_reaction().values()
+        row += system.support_forces().values()
         row += hub_values(system, state).values()
         row += [] if motion.pitch is None else [motion.pitch.angle(t)]
         row += system.outputs().values()
@@ -281,8 +282,6 @@ class Recorder:
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()
-            if self.snapshots is not None and len(out.stations.t):  # a run may fail before its first record
-                out.further.append(stations_writer(self.system, out.stations))
         if self.snapshots is not None and self.snapshots.kept:
             more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
             out.fields = fields_writer(self.system, self.snapshots.kept, more)

@@ -22,6 +22,7 @@ from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.unbalance import Unbalance
 from rotfem.mechanics.work import Frame, Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
@@ -75,6 +76,7 @@ class Model:
         effects: names of the effects in the model.
         motion: of the frame; that of a free hub reads its unknown.
         hub: angle of a free hub; None if the rotation is prescribed.
+        reacting: unbalances of a free hub in a history.
         frame: constants w, dw, a_o, gravity in use.
         mechanics: bodies, strains and loads.
         acting: the effects that have a term, by its name.
@@ -85,12 +87,16 @@ class Model:
         time: of the constants, s.
     """
 
-    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
+    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = False):
         self.problem, self.comm, self.theory = problem, comm, problem.theory
         self.time, self.compositions = 0.0, 1
         self.effects = problem.effective_effects()
         self.hub = HubAngle(problem.motion) if problem.motion.hub is not None else None
         self.motion: Motion = problem.motion if self.hub is None else self.hub.motion
+        self.reacting: tuple[Unbalance, ...] = ()
+        if moving and self.hub is not None:
+            self.problem = problem = problem.pushed(self.motion)
+            self.reacting = problem.unbalances
         self.structure: Structure = build(problem, comm)
         fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
         self.frame = Frame(

@@ -153,6 +153,10 @@ class Support(Moved):
     measure: Any
     at_rest: bool = True
 
+    def rigid_turn(self, e: Any) -> Any:
+        """Return e×x of a support in the fixed frame; nothing of one that turns with the hub."""
+        return ufl.as_vector((-e[0] * self.x[1], e[0] * self.x[0])) if self.at_rest else ufl.zero(2)
+
     def symmetric(self) -> Any:
         """Return the rows of the symmetric part of K."""
         (a, b), (c, d) = self.stiffness

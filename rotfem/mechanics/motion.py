@@ -131,7 +131,7 @@ class Motion:
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
-            "sharp": (t[0], t[-1]) if kind == "cubic" else tuple(t),
+            "sharp": (t[0], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
             "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))

@@ -137,12 +137,10 @@ class Problem:
         """Return the problem in the rotating frame where it is in the inertial one, else as it is."""
         return self.replace(frame="rotating") if self.frame == "inertial" else self
 
-    def pushed(self) -> Self:
-        """Return the problem of a history, in which unbalances push."""
+    def pushed(self, motion: Motion) -> Self:
+        """Return the problem of a history, in which unbalances push as they turn with a motion."""
         found = self.unbalances
-        if not found:
-            return self
-        return self.replace(loads=pushed(self.loads, found, self.motion, self.frame != "fixed"))
+        return self.replace(loads=pushed(self.loads, found, motion, self.frame != "fixed")) if found else self
 
     def _check_supports(self) -> None:
         """Refuse bearings that differ by direction where the shaft does, too: periodic coefficients in any frame."""

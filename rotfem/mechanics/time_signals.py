@@ -15,11 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss, legvander
+from numpy.polynomial.polynomial import polyval
 
 from rotfem.mechanics.free_hub import Torque
 from rotfem.mechanics.loads import Load, PlaceLoad
@@ -37,6 +39,9 @@ Fit = tuple[float, float, int]
 #: Gauss points and weights on (0, 1): exact for polynomials of degree 7, as a cubic times one.
 POINTS, WEIGHTS = (x / 2 for x in leggauss(4))
 POINTS = POINTS + 0.5
+
+#: Column k: coefficients of the powers of x in (2k + 1) P_k, up to cubics.
+LEGENDRE = np.array([[1.0, 0.0, -2.5, 0.0], [0.0, 3.0, 0.0, -10.5], [0.0, 0.0, 7.5, 0.0], [0.0, 0.0, 0.0, 17.5]])
 
 
 @dataclass
@@ -87,6 +92,14 @@ class TimeSignal:
     view: View = field(default_factory=View)
     _fit: tuple[Fit, Array] | None = None
 
+    @cached_property
+    def _points(self) -> Array:
+        return np.union1d(self.knots, self.smooth)
+
+    @cached_property
+    def _is_number(self) -> bool:
+        return np.ndim(self.at(0.0)) == 0
+
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
         if self.many is not None:
@@ -95,15 +108,21 @@ class TimeSignal:
 
     def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
-        middle, h = 0.5 * (begin + end), end - begin
+        x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
+        return np.asarray(polyval(x, self._powers(begin, end, degree)), dtype=np.float64).T
+
+    def _powers(self, begin: float, end: float, degree: int) -> Array:
+        """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
         if self._fit is None or self._fit[0] != (begin, end, degree):
-            points = np.union1d(self.knots, self.smooth)
-            edges = np.array([begin, *points[(points > begin) & (points < end)], end])
+            middle, h = 0.5 * (begin + end), end - begin
+            first, last = np.searchsorted(self._points, (begin, end), side="right")
+            inside = self._points[first:last]
+            edges = np.array([begin, *inside[inside < end], end])
             s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
             weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
             moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
-            self._fit = (begin, end, degree), (2 * np.arange(degree + 1) + 1)[:, None] * moments
-        return legvander((t - middle) * (2 / h), degree) @ self._fit[1]
+            self._fit = (begin, end, degree), LEGENDRE[: degree + 1, : degree + 1] @ moments
+        return self._fit[1]
 
     def deviation(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return |f − f̄| at times (n,) of a step, as parts of the largest |f| there."""
@@ -114,8 +133,9 @@ class TimeSignal:
     def seen(self, t: float) -> Any:
         """Return the value at a time (s), evaluated as the view says."""
         if self.view.line is not None:
-            value = self.fitted(np.array([t]), *self.view.line)[0]
-            return float(value[0]) if np.ndim(self.at(t)) == 0 else value
+            begin, end, _ = self.view.line
+            value = np.asarray(polyval((2 * t - begin - end) / (end - begin), self._powers(*self.view.line)))
+            return float(value[0]) if self._is_number else value
         return self.at(t + self.view.side * SAME * (abs(t) or SAME)) if self.view.side else self.at(t)
 
 

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -41,7 +42,7 @@ from rotfem.structures.beam import Beam
 from rotfem.structures.mode_names import Wave, shaft_wave
 from rotfem.structures.reference_rotation import SectionTurns, check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
-from rotfem.structures.structure import Array
+from rotfem.structures.structure import Array, PointValues
 
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
 AXIS_DEGREE = 5
@@ -325,6 +326,7 @@ class SpatialBeam(Beam):
     def supports(self, frame: Any) -> list[Support]:
         """Return the supports, across direction 1: of displacements and of turns, and what is under their housings."""
         out, q, along = [], self.k.q, abs(self.problem.motion.axis[0]) == 1.0
+        theta = self._total_rotation()
         for i, support in enumerate(self.data.supports):
             at, at_rest = self.points.measure((support.x,)), along and support.frame != "rotating"
             places = [(q[1], q[2]), *(self._housing(j) for j in range(len(support.housing))), (0, 0)]
@@ -333,11 +335,44 @@ class SpatialBeam(Beam):
             moves = [tuple(x - y for x, y in zip(*pair, strict=True)) for pair in pairwise(places)]
             for (name, of, kind), x in [
                 *zip(springs, moves, strict=True),
-                ((f"supports_{i}_", support, "tilt_"), (q[4], q[5])),
+                ((f"supports_{i}_", support, "tilt_"), (theta[1], theta[2])),
             ]:
                 keys = [f"{kind}stiffness", f"{kind}damping"]
                 K, D = (frame.coefficients(f"{name}{key}", getattr(of, key)) for key in keys)
                 out.append(Support(ufl.as_vector(x), K, D, at, at_rest))
+        return out
+
+    @cached_property
+    def _at_supports(self) -> list[PointValues]:
+        return [PointValues(self.V, np.array([support.x, 0.0, 0.0])) for support in self.data.supports]
+
+    def support_forces(
+        self, frame: Any, speed: float, q: npt.NDArray[Any], v: npt.NDArray[Any]
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return the force of the beam on every support (N), "support_0_f", and a moment (N·m), "support_0_m".
+
+        Args:
+            frame: constants, with what coefficients of supports depend on.
+            speed: of rotation, rad/s.
+            q: local dof array, or that of complex amplitudes.
+            v: its rates.
+
+        Returns:
+            Components along directions 2 and 3 of the frame, (2,) each.
+        """
+        out: dict[str, npt.NDArray[Any]] = {}
+        fixed = frame.spun or abs(self.problem.motion.axis[0]) != 1.0
+        for i, (support, at) in enumerate(zip(self.data.supports, self._at_supports, strict=True)):
+            x, rate = (dict(zip(self.unknowns, at(y), strict=True)) for y in (q, v))
+            for kind, of, name in (("", "u", "f"), ("tilt_", "theta", "m")):
+                K, D = (frame.coefficient(getattr(support, f"{kind}{key}"), speed) for key in ("stiffness", "damping"))
+                d, dd = (np.array([y.get(f"{of}{i}", 0.0) for i in (2, 3)]) for y in (x, rate))
+                if support.housing and not kind:
+                    d, dd = (a - [y[f"u{i}_housing_0"] for i in (2, 3)] for a, y in ((d, x), (dd, rate)))
+                if not (fixed or support.frame == "rotating"):
+                    dd = dd + speed * self.problem.motion.axis[0] * np.array([-d[1], d[0]])
+                if not kind or np.any([K, D]):
+                    out[f"support_{i}_{name}"] = K @ d + D @ dd
         return out
 
     def _housing(self, j: int) -> tuple[Any, Any]:

@@ -239,6 +239,12 @@ class Structure(Loaded):
         """Return the supports between the structure and the fixed frame; none here."""
         return []
 
+    def support_forces(
+        self, frame: Any, speed: float, q: npt.NDArray[Any], v: npt.NDArray[Any]
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return the forces of the structure on its supports; none here."""
+        return {}
+
     @property
     def released(self) -> set[int]:
         """Numbers of the components that the clamp leaves free: turns in hinges."""
