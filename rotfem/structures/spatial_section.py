@@ -184,13 +184,13 @@ class SectionForms:
         """
         M = self._matrix("mass")
         self.mass = M[0][0]
-        c = [entry if isinstance(entry, int) else entry / self.mass for entry in (M[1][5], M[2][3], M[0][4])]
+        c: list[Any] = [entry if isinstance(entry, int) else entry / self.mass for entry in (M[1][5], M[2][3], M[0][4])]
         size = ufl.dot(ufl.as_vector(c), ufl.as_vector(c))
         J = [[M[3 + i][3 + j] - self.mass * (size * (i == j) - c[i] * c[j]) for j in range(3)] for i in range(3)]
         half = (J[0][0] + J[1][1] + J[2][2]) / 2
         E = [[half * (i == j) - J[i][j] for j in range(3)] for i in range(3)]
         pairs, along = moving_moments(self._data.at(self._data.knots)["mass"])
-        self.mass_center = tuple(c) if along else (0, c[1], c[2])
+        self.mass_center = (c[0] if along else 0, c[1], c[2])
         self.directors = []
         for i, j in pairs:
             axis = np.eye(3)[i] if i == j else (np.eye(3)[i] + np.eye(3)[j]) / np.sqrt(2)
