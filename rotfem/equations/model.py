@@ -105,8 +105,12 @@ class Model:
         self.switches: dict[str, fem.Constant] = {}
         self._switched_off: frozenset[str] = frozenset()
         chosen = [Effect.registry[name] for name in self.effects]
-        if problem.frame == "fixed":  # internal damping turns with the shaft, and feeds its whirl
-            chosen = [replace(e, constants=None, passive=False) if e.name == "damping" else e for e in chosen]
+        # In the other frame the forces of dampers are products of their constants and the speed, and may feed a whirl.
+        internal, inside = ("damping", "coupling_dampers"), problem.frame == "fixed"
+        moved = internal if inside else ("support_dampers",)
+        chosen = [
+            replace(e, constants=None, passive=e.passive and not inside) if e.name in moved else e for e in chosen
+        ]
         if pitching:  # springs of axes that the frame turns about
             chosen = [replace(effect, constants=None) if effect.at_root else effect for effect in chosen]
         further = [Effect(name, term) for name, term in problem.terms.items()]

@@ -100,6 +100,11 @@ def supports_of(problem: Any) -> Any:
     return getattr(problem.structure, "supports", ())
 
 
+def couplings_of(problem: Any) -> Any:
+    """Return the couplings of a problem's structure."""
+    return getattr(problem.structure, "couplings", ())
+
+
 def pitches(problem: Any) -> bool:
     """Return whether the frame of a problem turns with a pitch over time too."""
     return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
@@ -122,7 +127,8 @@ LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("p
 
 _SPINS = ("the structure spins", "nothing spins")
 _OF_ROTATION: dict[str, Any] = {"of_rotation": True, "momentum": True}
-_AT_ROOT: dict[str, Any] = {"constants": (), "internal": True, "passive": True, "at_root": True}
+_INTERNAL: dict[str, Any] = {"internal": True, "passive": True}
+_AT_ROOT: dict[str, Any] = {"constants": (), "at_root": True, **_INTERNAL}
 
 for _effect in (
     Effect("coriolis", _work("coriolis"), turns, _SPINS, ("w",), kinetic="T1", **_OF_ROTATION),
@@ -195,6 +201,23 @@ for _effect in (
         lambda problem: any(s.feeds for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
         ("supports",),
+    ),
+    Effect(
+        "couplings",
+        _work("couplings"),
+        lambda problem: bool(couplings_of(problem)),
+        ("the beam has couplings", "no couplings"),
+        ("supports",),
+        potential=_work("potential_of_couplings"),
+        **_INTERNAL,
+    ),
+    Effect(
+        "coupling_dampers",
+        _work("coupling_dampers"),
+        lambda problem: any(c.feeds for c in couplings_of(problem)),
+        ("couplings have dampers", "couplings have no dampers"),
+        ("supports",),
+        **_INTERNAL,
     ),
     Effect(
         "trapeze",

@@ -228,7 +228,7 @@ class Scene(SceneModel):
             if support.frame == "fixed" and any(motion.axis[1:]):
                 why = "is of a beam that spins about its own axis; those of others stand in the rotating frame"
                 raise problem(f"structure.supports.{i}.frame", "fixed", why)
-        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_loads(structure, motion, self.loads, self.time is not None)
         check_mesh(structure, self.mesh)
         check_theory(structure, model)
         check_frame(structure, motion, model)

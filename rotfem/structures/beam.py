@@ -63,7 +63,7 @@ class Beam(Structure):
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.masses = getattr(self.data, "masses", ())
-        supported = getattr(self.data, "supports", ())
+        supported = (*getattr(self.data, "supports", ()), *getattr(self.data, "couplings", ()))
         points = [*problem.loads.places, *((at.x,) for at in (*self.masses, *supported))]
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
