@@ -156,8 +156,9 @@ class March:
         """Yield the states at step, 2 step, … and end (s); the last step may be shorter."""
         steps, step, reached = self.steps, float(self.steps.step or 0.0), state.t
         times = np.append(np.arange(int(np.ceil(steps.end / step - 1e-9))) * step, steps.end)
-        knots = knots_of(self.system.signals, times, steps.breakpoints)
-        grid = (part for part in intervals(knots, times, step, self.scheme.order > 2) if part.end > reached)
+        divided = self.scheme.order > 2
+        knots = knots_of(self.system.signals, times, steps.breakpoints, divided)
+        grid = (part for part in intervals(knots, times, step, divided) if part.end > reached)
         for part, after in pairwise(chain(grid, [None])):
             assert part is not None
             start = self.begun(state, View(1), part) if state.t == 0.0 else state
