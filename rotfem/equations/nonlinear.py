@@ -373,16 +373,15 @@ class EnergyBalance:
         if self.model.hub is not None:
             return
         _ = self._N
-        energy, self._due = memory or (None, 0.0)
-        self._H_0 = self._H(self._q_0, self._v_0) if energy is None or not self.model.closed else energy
+        self._due = memory or 0.0
+        self._H_0 = self._H(self._q_0, self._v_0)
 
-    def finish(self) -> tuple[float, float] | None:
-        """Return the energy at the end of the solved step and the defect of its balance, for the next one (J)."""
+    def finish(self) -> float | None:
+        """Return the defect of the energy's balance of the solved step (J), for the next one."""
         if self.model.hub is not None:
             return None
         work = self._work_done()
-        H_1 = self._H(self._end.x.array, 2 * self._middle[1] - self._v_0)
-        return H_1, self._due + self._H_0 + work - H_1
+        return self._due + self._H_0 + work - self._H(self._end.x.array, 2 * self._middle[1] - self._v_0)
 
     def prescribe(self, clamp: TurningClamp, q: Array, v: Array, a: Array) -> None:
         """Write the motion of the clamp so that it is exact at the end of the step."""
