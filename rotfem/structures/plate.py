@@ -135,7 +135,7 @@ class Plate(Structure):
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     planes: ClassVar = {2: (0, 1)}
     is_flat = True
-    prestress_strains: ClassVar = ("membrane",)
+    prestress_strains: ClassVar = ("membrane", "membrane, full", "membrane, reduced")
     stiff: ClassVar = ("shear",)
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
@@ -251,23 +251,25 @@ class Plate(Structure):
         """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses.
 
         Reduced integration does not see displacements like (1 − 3ξ²)(1 − 3η²) of neighbouring elements. So the
-        membrane is integrated fully in the linear theories, where it does not lock; in the others SEEN of its linear
-        part is, and in all of them a part of the shear by u_3 that the bending stiffness bounds.
+        membrane, its directors normal to it, is integrated fully in the linear theories, where it does not lock; in the
+        others SEEN of its linear part is, and in all of them a part of the shear by u_3 that the bending stiffness
+        bounds. What shear adds to the membrane, −½ γ_γ γ_β, has the points of the shear energy, which exceeds it.
         """
         q, counted = self.k.q, self.turns is not None and self.turns.rotation is not None
         membrane, shear, curvature = measures(q, self.director(q)) if counted else measures(q)
         linear, p = self.problem.theory.linear, PlateGradients(self.k.q)
         h, Q, kG = self.section["thickness"], plane_stress(self.section), shear_moduli(self.section)
         strains = [
-            Strain("membrane", _voigt(membrane), h * Q, self.dx if linear else self.dx_elastic),
+            Strain("membrane", _voigt(membrane), h * Q, self.dx_elastic),
             Strain("shear", shear, h * kG, self.dx_elastic),
             Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
         ]
         if self.problem.mesh.integration == "full":
             return strains
         bounded = SEEN * h**3 / (h**2 + abs(ufl.JacobianDeterminant(self.mesh)))
-        unseen = [] if linear else [("membrane", _voigt(ufl.sym(p.du)), SEEN * h * Q)]
-        for name, value, stiffness in [*unseen, ("shear", p.dw, bounded * kG)]:
+        unseen = measures(ufl.as_vector((q[0], q[1], q[2], *p.dw)))[0] if linear else ufl.sym(p.du)
+        in_plane = ("membrane", _voigt(unseen), (1 if linear else SEEN) * h * Q)
+        for name, value, stiffness in [in_plane, ("shear", p.dw, bounded * kG)]:
             strains.append(Strain(f"{name}, full", value, stiffness, self.dx))
             strains.append(Strain(f"{name}, reduced", value, -stiffness, self.dx_elastic))
         return strains

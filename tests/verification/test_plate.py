@@ -531,3 +531,36 @@ def test_travelling_waves(tmp_path: Path) -> None:
         # The Coriolis force on the directors couples the angles against the spin: ω₋ > ω₊.
         assert a["frequency_fixed"][-1] == pytest.approx(low + m * 6000.0, rel=1e-3)
         assert b["frequency_fixed"][-1] == pytest.approx(abs(high - m * 6000.0), abs=1e-3 * high)
+
+
+# --- films: tension outweighs the bending stiffness of a cell ---------------------------------------------------------
+
+FILM = {"type": "plate", "E": 4e9, "nu": 0.3, "rho": 1400.0}
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear", "reissner"])
+def test_spinning_annulus(theory: str, tmp_path: Path) -> None:
+    """A film of 0.2 to 1 m, 1 mm thick, at 100 rad/s: a Ritz code's frequencies of 0 to 3 diameters."""
+    mesh = disk_mesh(tmp_path / "film.msh", 0.2, 1.0, 40, 4)
+    structure = {**FILM, "mesh": str(mesh), "thickness": 1e-3}
+    motion = {"type": "constant", "speed": 100.0}
+    tables = {"structure": structure, "motion": motion, "model": {"theory": theory}, "modes": {"count": 6}}
+    found = rotfem.modes(tables)
+    assert found.stable
+    assert not found.warnings
+    np.testing.assert_allclose(found.frequencies[[0, 1, 3, 5]], [86.396, 108.056, 150.999, 196.177], rtol=5e-3)
+
+
+@pytest.mark.parametrize(("theory", "thickness"), [("consistent_linear", 1e-3), ("consistent_linear", 1e-5)])
+def test_heliogyro(theory: str, thickness: float) -> None:
+    """A blade of film: bending has Ω √(n(2n − 1)), as a chain has, torsion Ω √(n(2n − 1) + 1) (MacNeal 1967)."""
+    structure = {**FILM, "length": 10.0, "width": 1.0, "thickness": thickness}
+    motion = {"type": "constant", "speed": 10.0, "axis": [0, 0, 1]}
+    tables = {"structure": structure, "motion": motion, "model": {"theory": theory}, "modes": {"count": 6}}
+    found = rotfem.modes(tables)
+    assert found.stable
+    assert not any("unstable" in warning for warning in found.warnings)
+    rows = {row["label"]: row["frequency"] / 10.0 for row in found.rows}
+    for family, more in (("bending", 0), ("torsion", 1)):
+        both = [rows[f"1st {family}"], rows[f"2nd {family}"]]
+        np.testing.assert_allclose(both, np.sqrt([1 + more, 6 + more]), rtol=2e-3)
