@@ -107,7 +107,7 @@ def _coefficients(known: int) -> tuple[Array, Array]:
 
 def derivatives(curve: Array, x: Array) -> list[Array]:
     """Return polynomials of coefficients (powers, number) and their first two derivatives at x, (n, number) each."""
-    return [np.asarray(polyval(x, polyder(curve, k))).T for k in range(3)]
+    return [np.asarray(polyval(x, polyder(curve, k)), dtype=np.float64).T for k in range(3)]
 
 
 def write_state(system: System, state: State) -> None:

@@ -50,8 +50,7 @@ ARRAY, CLASS = "#array", "#class"
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
     "log": ("steps", "parts", "warnings", "resumed"),
-    "monitor": ("since", "stability"),
-    "monitor.farthest": ("seen",),
+    "monitor": ("since", "stability", "farthest"),
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),

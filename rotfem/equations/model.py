@@ -200,11 +200,7 @@ class Model:
     ) -> Both:
         """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
 
-        Args:
-            purpose: what they depend on in addition to the residual.
-            make: name ↦ UFL form.
-            more: constants and functions in them that are not in the residual.
-            once: see `rotfem.numerics.forms.form`.
+        `purpose` says what they depend on besides; `more` has constants and functions that are not in the residual.
         """
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
