@@ -193,7 +193,7 @@ class Simulation:
             self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
             march.observers.append(self.rows)
         march.observers.append(self._leg)
-        with self.store.interrupts():
+        with self.store.interrupts:
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
                 self._stepped(state, time)
