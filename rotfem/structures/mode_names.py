@@ -64,7 +64,7 @@ class Wave:
     """How a mode of a rotor precesses, seen from the rotor or the fixed frame.
 
     Attributes:
-        number: m, nodal diameters of a disk, 1 of a shaft.
+        number: m, nodal diameters of a disk, 1 of a shaft that bends, 0 of torsion and stretch.
         share: (|a|² − |b|²)/(|a|² + |b|²): 1 for a wave that runs with the spin, −1 against it, 0 for a standing one.
         shaft: whether it is that of a shaft, which whirls, or of a disk.
         fixed: whether frequency and shape are those in the fixed frame.
@@ -103,7 +103,8 @@ def shaft_wave(moves: npt.NDArray[Any], turns: npt.NDArray[Any], axis: npt.NDArr
     y, z = moves @ first, moves @ np.cross(axis, first)
     a, b = (float(np.sum(np.abs(y + sign * 1j * z) ** 2)) for sign in (1.0, -1.0))
     along = float(np.sum(np.abs(moves @ axis) ** 2 + np.abs(turns @ axis) ** 2))
-    return Wave(1, (a - b) / (a + b) if a + b > 2.0 * along else 0.0, True)
+    bends = a + b > 2.0 * along
+    return Wave(int(bends), (a - b) / (a + b) if bends else 0.0, True)
 
 
 def in_phase(y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -220,7 +220,7 @@ class SpatialBeam(Beam):
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
             return False
-        rigid = [(data.tip_offset, data.tip_inertia_matrix), *((m.offset, m.inertia_matrix) for m in data.masses)]
+        rigid = [(body.offset, body.inertia_matrix) for body in data.bodies.values()]
         if any(offset[normal] != 0.0 or np.any(np.delete(J[normal], normal)) for offset, J in rigid):
             return False
         knots = np.union1d(data.section.knots, data.length)
@@ -429,7 +429,8 @@ class SpatialBeam(Beam):
         bodies = [self._mass(forms.mass, forms.mass_center, self.dx)]
         if "rotary_inertia" in effects:
             bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
-        bodies += self._tip_bodies() if "tip_mass" in effects else []
+        for rigid in self.rigid_bodies() if "tip_mass" in effects else ():
+            bodies += self._rigid_body(*rigid)
         for i, support in enumerate(self.data.supports if {"supports", "tip_mass"} <= set(effects) else ()):
             for j, under in enumerate(support.housing):
                 mass = self.scalar(f"supports_{i}_housing_{j}_mass", under.mass)
@@ -450,18 +451,9 @@ class SpatialBeam(Beam):
         d = self._from_triad(axis)
         return SectionBody(d, density, measure, False, effect, arm=d, turn=self._turn)
 
-    def _tip_bodies(self) -> list[Body]:
-        """Return the mass at the tip and those along the beam, and their directors."""
-        s = self.data
-        out = self._rigid_body("tip", self.tip, s.tip_mass, s.tip_offset, (s.tip_inertia, s.tip_inertia_matrix))
-        for i, body in enumerate(self.masses):
-            at, inertia = self.points.measure((body.x,)), (body.inertia, body.inertia_matrix)
-            out += self._rigid_body(f"masses_{i}", at, body.mass, body.offset, inertia)
-        return out
-
-    def _rigid_body(self, name: str, at: Any, mass: float, offset: Any, inertia: tuple[Any, Any]) -> list[Body]:
-        """Return a mass (kg) at an offset (m, section axes), and its directors; inertia as given, and as a tensor."""
-        given, tensor = inertia
+    def _rigid_body(self, name: str, body: Any, at: Any) -> list[Body]:
+        """Return a mass at its offset (section axes), and its directors."""
+        mass, offset = body.mass, body.offset
         out = []
         if mass > 0:
             if self.problem.frame == "fixed":  # what is off the axis turns: it is unbalance
@@ -470,9 +462,9 @@ class SpatialBeam(Beam):
                 self.scalar(f"{name}_offset_{i}", c) if c != 0.0 else 0 for i, c in enumerate(offset, start=1)
             )
             out.append(self._mass(self.scalar(f"{name}_mass", mass), center, at, "tip_mass"))
-        for i, (moment, axis) in enumerate(euler_tensor(tensor), start=1):
-            if isinstance(given, float):  # isotropic: each director has half of it
-                density = self.scalar(f"{name}_inertia", given) / 2
+        for i, (moment, axis) in enumerate(euler_tensor(body.inertia_matrix), start=1):
+            if isinstance(body.inertia, float):  # isotropic: each director has half of it
+                density = self.scalar(f"{name}_inertia", body.inertia) / 2
             else:
                 density = self.scalar(f"{name}_director_inertia_{i}", moment)
             out.append(self._director(tuple(axis), density, at, "tip_mass"))
