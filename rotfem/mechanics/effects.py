@@ -40,7 +40,6 @@ class Effect:
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
             impulse that hub and structure are given.
-        passive: whether its forces store or dissipate energy, and never add any.
         at_root: whether its forces act between the hub and the root only.
         kinetic: its part of the kinetic energy, "T1" or "T0".
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
@@ -56,7 +55,6 @@ class Effect:
     of_rotation: bool = False
     internal: bool = False
     momentum: bool = False
-    passive: bool = False
     at_root: bool = False
     kinetic: str = ""
     potential: Potential | None = None
@@ -121,14 +119,13 @@ def moves_origin(problem: Any) -> bool:
 
 
 # What every model has.
-INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True, passive=True)
+INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True)
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
 LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("potential_of_loads"))
 
 _SPINS = ("the structure spins", "nothing spins")
 _OF_ROTATION: dict[str, Any] = {"of_rotation": True, "momentum": True}
-_INTERNAL: dict[str, Any] = {"internal": True, "passive": True}
-_AT_ROOT: dict[str, Any] = {"constants": (), "at_root": True, **_INTERNAL}
+_AT_ROOT: dict[str, Any] = {"constants": (), "internal": True, "at_root": True}
 
 for _effect in (
     Effect("coriolis", _work("coriolis"), turns, _SPINS, ("w",), kinetic="T1", **_OF_ROTATION),
@@ -169,7 +166,6 @@ for _effect in (
         ("there is a damping coefficient", "no damping"),
         (),
         internal=True,
-        passive=True,
     ),
     Effect(
         "root_springs",
@@ -192,7 +188,6 @@ for _effect in (
         lambda problem: bool(supports_of(problem)),
         ("a shaft has supports", "no supports"),
         ("supports",),
-        passive=True,
         potential=_work("potential_of_supports"),
     ),
     Effect(
@@ -208,8 +203,8 @@ for _effect in (
         lambda problem: bool(couplings_of(problem)),
         ("the beam has couplings", "no couplings"),
         ("supports",),
+        internal=True,
         potential=_work("potential_of_couplings"),
-        **_INTERNAL,
     ),
     Effect(
         "coupling_dampers",
@@ -217,7 +212,7 @@ for _effect in (
         lambda problem: any(c.feeds for c in couplings_of(problem)),
         ("couplings have dampers", "couplings have no dampers"),
         ("supports",),
-        **_INTERNAL,
+        internal=True,
     ),
     Effect(
         "trapeze",
