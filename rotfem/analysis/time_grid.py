@@ -61,14 +61,7 @@ class Interval:
 
 
 def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
-    """Yield the intervals of all steps.
-
-    Args:
-        knots: of the prescribed data, s.
-        times: ends of the steps, the first the start of the march, s.
-        step: nominal length of a step, s.
-        divided: whether steps are taken from knot to knot where these are few.
-    """
+    """Yield the intervals of steps between times (s), nominally `step` long (s), `divided` at few knots (s)."""
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.dense_output import write_state
-from rotfem.analysis.equilibrium import LargestState
+from rotfem.analysis.equilibrium import conditioning, rounding_message
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
@@ -64,14 +65,15 @@ class Monitor:
 
     Attributes:
         since: from when on (s) the speed was above the critical one; None before.
-        farthest: largest state so far.
+        farthest: of a linear theory the largest component of displacements over the length or of rotations (rad) so
+            far, by which round-off is judged, its time (s) and state.
         stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
     """
 
     def __init__(self, system: System, critical: float | None):
         self.system, self.critical = system, critical
         self.since: float | None = None
-        self.farthest = LargestState(system)
+        self.farthest: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
         self.stability: Stability | None = None
 
     def step(self, state: State) -> None:
@@ -109,7 +111,20 @@ class Monitor:
         """Take note of a state that is recorded."""
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
-        self.farthest(state.q, state.t)
+        elif (size := float(np.max(self.system.sizes(state.q), initial=0.0))) > 1.02 * self.farthest[
+            0
+        ]:  # some are copied
+            self.farthest = (size, state.t, np.array(state.q))
+
+    def round_off(self) -> str:
+        """Return the warning of what round-off may have done to the largest state, which it sets; empty if little."""
+        size, t, q = self.farthest
+        if size < 0.0:
+            return ""
+        self.system.set_time(t)
+        with suppress(ComputationError):
+            return rounding_message(conditioning(self.system, q[: len(self.system.scale)], t or np.inf))
+        return ""
 
 
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import FreeHub
+from rotfem.mechanics.loads import Load
 from rotfem.mechanics.pitch import Pitch, turn_about
 from rotfem.registry import Registry
 from rotfem.registry import motion_laws as registered
@@ -55,11 +56,6 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 
-def no_acceleration(t: float) -> Array:
-    """Return a_o = 0."""
-    return np.zeros(3)
-
-
 def about(axis: npt.ArrayLike) -> Array:
     """Return the unit vector along an axis of any length, shape (3,)."""
     e = np.asarray(axis, dtype=float)
@@ -75,18 +71,16 @@ class Motion:
         rate: dOmega/dt(t) in rad/s^2.
         angle: psi(t) = integral of Omega from 0, in rad.
         axis: unit vector e, frame components.
-        base_acceleration: a_o(t), shape (3,), frame components, m/s^2.
+        base: a_o(t), frame components, m/s^2, as a sum; None: 0.
         constant: whether Omega and a_o do not change with time.
         is_spinning: whether Omega is anything but zero, as far as is known.
         changes_speed: whether Omega changes, as far as is known.
-        is_accelerated: whether a_o is anything but zero.
         knots: times (s) between which Omega is smooth and nearly a polynomial.
         sharp: those of them at which it may jump or have a kink.
         bent: those of them at which its rate has a kink.
         breakpoints: of a function, those that its user named; None if they are searched.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
-        base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
         pitch: turn of the frame in addition to that of the hub (see `rotfem.mechanics.pitch`); None: the frame is the
@@ -97,18 +91,16 @@ class Motion:
     rate: Scalar
     angle: Scalar
     axis: Array
-    base_acceleration: Callable[[float], Array] = no_acceleration
+    base: Load | None = None
     constant: bool = False
     is_spinning: bool = True
     changes_speed: bool = True
-    is_accelerated: bool = False
     knots: tuple[float, ...] = ()
     sharp: tuple[float, ...] = ()
     bent: tuple[float, ...] = ()
     breakpoints: tuple[float, ...] | None = None
     smooth: bool = True
     arrays: bool = False
-    base_knots: tuple[float, ...] | None = None
     settled: float = 0.0
     hub: FreeHub | None = None
     pitch: Pitch | None = None
@@ -183,6 +175,15 @@ class Motion:
         state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
         return replace(cls.constant_speed(hub.speed, axis), **(state | more))
 
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether a_o is anything but zero."""
+        return self.base is not None and not self.base.is_zero
+
+    def base_acceleration(self, t: float) -> Array:
+        """Return a_o(t), shape (3,), frame components, m/s²."""
+        return np.zeros(3) if self.base is None else self.base.at(t)
+
     def frame(self, t: float) -> dict[str, Array]:
         """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
 
@@ -201,8 +202,8 @@ class Motion:
 
     def at_speed(self, omega: float) -> Motion:
         """Return the same frame spinning at the constant speed omega (rad/s), its pitch that of t = 0."""
-        still = Motion.constant_speed(omega, self.axis, pitch=None if self.pitch is None else self.pitch.held())
-        return replace(still, base_acceleration=self.base_acceleration, is_accelerated=self.is_accelerated)
+        pitch = None if self.pitch is None else self.pitch.held()
+        return Motion.constant_speed(omega, self.axis, pitch=pitch, base=self.base)
 
     def pitched(self, pitch: Pitch) -> Motion:
         """Return the motion of a frame that pitches over time too."""

@@ -182,11 +182,8 @@ def _viewed_load(name: str, load: Load, see: Callable[..., TimeSignal]) -> Load:
 def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
     """Return a motion, evaluated as a view says; speed, pitch and its rate must not jump."""
     changes: dict[str, Any] = {}
-    if motion.is_accelerated and not motion.constant:
-        base, at = motion.base_knots, motion.base_acceleration
-        changes["base_acceleration"] = see(
-            "motion.base_acceleration", at, base, many=_between(at, base), known=base is not None
-        ).seen
+    if motion.base is not None and not motion.base.constant:
+        changes["base"] = _viewed_load("motion.base_acceleration", motion.base, see)
     if motion.hub is not None:
         if len((torque := motion.hub.torque).knots):
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
@@ -204,11 +201,3 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
             turned[name] = see(key, f, pitch.knots, known=pitch.known, continuous=name != "acceleration").seen
         changes["pitch"] = replace(pitch, **turned)
     return replace(motion, **changes)
-
-
-def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:
-    """Return a signal of an array of times that is linear between knots; None where it is not, or jumps there."""
-    if not knots or np.any(np.diff(knots) <= 0.0):
-        return None
-    columns = np.array([at(t) for t in knots], dtype=float).T
-    return lambda t: np.stack([np.interp(t, knots, column) for column in columns], axis=1)
