@@ -105,8 +105,9 @@ class Model:
         self.switches: dict[str, fem.Constant] = {}
         self._switched_off: frozenset[str] = frozenset()
         chosen = [Effect.registry[name] for name in self.effects]
-        if problem.frame == "fixed":  # internal damping turns with the shaft, and feeds its whirl
-            chosen = [replace(e, constants=None) if e.name == "damping" else e for e in chosen]
+        # In the other frame the forces of dampers are products of their constants and the speed.
+        moved = ("damping", "coupling_dampers") if problem.frame == "fixed" else ("support_dampers",)
+        chosen = [replace(effect, constants=None) if effect.name in moved else effect for effect in chosen]
         if pitching:  # springs of axes that the frame turns about
             chosen = [replace(effect, constants=None) if effect.at_root else effect for effect in chosen]
         further = [Effect(name, term) for name, term in problem.terms.items()]

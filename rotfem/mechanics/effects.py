@@ -98,6 +98,11 @@ def supports_of(problem: Any) -> Any:
     return getattr(problem.structure, "supports", ())
 
 
+def couplings_of(problem: Any) -> Any:
+    """Return the couplings of a problem's structure."""
+    return getattr(problem.structure, "couplings", ())
+
+
 def pitches(problem: Any) -> bool:
     """Return whether the frame of a problem turns with a pitch over time too."""
     return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
@@ -191,6 +196,23 @@ for _effect in (
         lambda problem: any(s.feeds for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
         ("supports",),
+    ),
+    Effect(
+        "couplings",
+        _work("couplings"),
+        lambda problem: bool(couplings_of(problem)),
+        ("the beam has couplings", "no couplings"),
+        ("supports",),
+        internal=True,
+        potential=_work("potential_of_couplings"),
+    ),
+    Effect(
+        "coupling_dampers",
+        _work("coupling_dampers"),
+        lambda problem: any(c.feeds for c in couplings_of(problem)),
+        ("couplings have dampers", "couplings have no dampers"),
+        ("supports",),
+        internal=True,
     ),
     Effect(
         "trapeze",
