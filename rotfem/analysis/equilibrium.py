@@ -51,17 +51,8 @@ def steady_state(
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
     Speed and loads are raised together (on hinges the loads at the full speed), in one step where Newton allows and in
-    smaller ones where not; the state is left in the system's functions.
-
-    Args:
-        system: equations of motion.
-        omega: speed, rad/s.
-        newton: iteration control.
-        start: first guess, the equilibrium at a nearby speed; the whole load is then applied at once.
-        notes: receives remarks on the way.
-
-    Raises:
-        ComputationError: no equilibrium was reached; says how far the load got.
+    smaller ones where not; the state is left in the system's functions. With a `start`, the equilibrium at a nearby
+    speed, the whole load is applied at once. `notes` receives remarks on the way.
     """
     notes = [] if notes is None else notes
     growth = LoadFactors(omega)
@@ -105,11 +96,7 @@ def _compliance_lost(system: System, growth: LoadFactors) -> bool:
 
 
 def _grown(system: System, growth: LoadFactors, newton: Newton, notes: list[str]) -> Array:
-    """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory.
-
-    Raises:
-        ComputationError: none was found; says how far the load got.
-    """
+    """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory."""
     found = raised(system, growth, newton)
     if found.least < REGULAR_SHARE:
         if _compliance_lost(system, growth):
@@ -125,11 +112,7 @@ def _grown(system: System, growth: LoadFactors, newton: Newton, notes: list[str]
 
 
 def check_steady(problem: Problem) -> None:
-    """Refuse what has no steady state in the rotating frame: gravity that turns with it.
-
-    Raises:
-        InputError: gravity has a component across the spin axis while the frame spins.
-    """
+    """Refuse what has no steady state in the rotating frame: gravity across the spin axis, which turns in it."""
     if problem.gravity_turns:
         raise InputError(
             "loads.gravity",
@@ -143,9 +126,6 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
     """Return q (local dof array) of the beam at rest under the tip force F_2 that gives u_2(L) = displacement (m).
 
     The tip is led there in one step where Newton allows, and in smaller ones where not.
-
-    Raises:
-        ComputationError: no equilibrium with this displacement was found; says how far the tip was led.
     """
     unit = Load("dead", (Term(Shapes.uniform([(0.0, 1.0, 0.0)])),))
     still, force = Motion.constant_speed(0.0), Loads(named={"tip_force": unit})
@@ -425,45 +405,6 @@ def limited(
 
 
 # --- round-off of the stiffness ---------------------------------------------------------------------------------------
-
-
-class LargestState:
-    """The largest state of a motion of a linear theory, by which the effect of round-off is judged.
-
-    Args:
-        system: equations of motion.
-
-    Attributes:
-        seen: largest component of displacements over the length or of rotations (rad), time (s) and state.
-    """
-
-    def __init__(self, system: System):
-        self.system = system
-        self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
-
-    def __call__(self, q: Array, t: float) -> None:
-        """Take note of a state (local dof array) of time t (s)."""
-        if not self.system.linear:
-            return
-        size = float(np.max(self.system.sizes(q), initial=0.0))
-        if size > 1.02 * self.seen[0]:  # so that not every state of a growing motion is copied
-            self.seen = (size, t, np.array(q))
-
-    def warning(self) -> str:
-        """Return the warning of what round-off may have done to the largest state; empty if that is little."""
-        size, t, q = self.seen
-        if size < 0.0:
-            return ""
-        system = self.system
-        state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time
-        system.set_time(t)
-        try:
-            return rounding_message(conditioning(system, q[: len(state[0])], t or np.inf))
-        except ComputationError:
-            return ""
-        finally:
-            system.set_time(time)
-            system.set_state(*state)
 
 
 def conditioning(system: System, q: Array, time: float = np.inf) -> float:

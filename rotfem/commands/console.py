@@ -75,7 +75,6 @@ class Session:
         self.as_json, self.quiet, self.debug, self.plots = as_json, quiet, debug, not no_plots
         self.first = self.comm.rank == 0
         self.bar = ProgressBar()
-        self._made: list[Path] = []
         self._warned, self._shown = 0, False
 
     def __enter__(self) -> Session:
@@ -90,10 +89,6 @@ class Session:
         units.SPEED.reset(self._unit)
         if hasattr(self, "results"):
             self.results.close(error)
-        if error is not None:  # remove the folders that this command made, the innermost first, if they are empty
-            with suppress(OSError):
-                for made in self._made:
-                    made.rmdir()
         self._pass_on()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
@@ -151,8 +146,6 @@ class Session:
             gc.enable()
         if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        if self.first:
-            self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
         self.results = ResultFolder(self.comm, path, command, inputs)
         return self.results
 

@@ -128,13 +128,15 @@ def doubtful(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
-    """Return warnings about the model: a rotating-frame frequency without Coriolis forces is not one."""
+    """Return warnings about the model: a plate that is nearly a disk, frequencies without Coriolis forces."""
+    doubt = getattr(analysis.structure, "doubt", "")
+    found = [doubt] if doubt else []
     if speed != 0.0 and "coriolis" not in analysis.model.effects:
-        return [
+        found.append(
             "coriolis is not among model.effects: frequencies in the rotating frame are wrong without it, and ω² can "
             "come out negative"
-        ]
-    return []
+        )
+    return found
 
 
 def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:

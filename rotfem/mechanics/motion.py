@@ -75,7 +75,8 @@ class Motion:
         is_spinning: whether Omega is anything but zero, as far as is known.
         changes_speed: whether Omega changes, as far as is known.
         knots: times (s) between which Omega is smooth and nearly a polynomial.
-        sharp: those of them at which a derivative of it may jump.
+        sharp: those of them at which it may jump or have a kink.
+        bent: those of them at which its rate has a kink.
         breakpoints: of a function, those that its user named; None if they are searched.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
@@ -94,6 +95,7 @@ class Motion:
     changes_speed: bool = True
     knots: tuple[float, ...] = ()
     sharp: tuple[float, ...] = ()
+    bent: tuple[float, ...] = ()
     breakpoints: tuple[float, ...] | None = None
     smooth: bool = True
     arrays: bool = False
@@ -130,6 +132,7 @@ class Motion:
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
             "sharp": (t[0], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
+            "bent": tuple(t) if kind == "pchip" else (),
             "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.structure import DampingTable, Hinge, Root, SpatialRoot, StructureTable, check_one_hub
-from rotfem.scene.supports import SupportTable
+from rotfem.scene.supports import CouplingTable, SupportTable
 from rotfem.scene.table import (
     BY_SHAPE,
     SceneModel,
@@ -267,6 +268,7 @@ class SpatialBeamStructure(BeamStructure):
             section table.
         root: hinges, springs, dampers and pitch angle at the clamp.
         supports: bearings along a shaft.
+        couplings: between parts of it.
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
@@ -281,6 +283,7 @@ class SpatialBeamStructure(BeamStructure):
     precone: Annotated[Number, unit("rad")] = 0.0
     root: SpatialRoot = empty()
     supports: tuple[SupportTable, ...] = ()
+    couplings: tuple[CouplingTable, ...] = ()
 
     @property
     def reference_line(self) -> ReferenceLine | SweptLine | None:
@@ -300,12 +303,11 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """Places (m) of masses, of supports, of kinks of the line, and of the ends of arcs."""
-        line = self.reference_line
-        return apart(
-            (*super().nodes, *(support.x for support in self.supports), *(line.kinks if line is not None else ())),
-            self.length,
-        )
+        """Places (m) of masses, supports, and couplings, of kinks of the line, and of the ends of arcs."""
+        line, joints = self.reference_line, sorted(coupling.x for coupling in self.couplings)
+        joints += [(a + b) / 2 for a, b in pairwise(joints)]  # no element is between two of them
+        kinks = line.kinks if line is not None else ()
+        return apart((*super().nodes, *(support.x for support in self.supports), *joints, *kinks), self.length)
 
     @property
     def root_position(self) -> tuple[float, float, float]:
@@ -325,11 +327,11 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def is_round(self) -> bool:
-        """Whether it is straight, and stiffness and inertia are the same in all directions about it.
+        """Whether it is straight, is the same in all directions about its axis, and no support turns.
 
         Masses off the axis are unbalance, no asymmetry.
         """
-        if not self.is_straight or self.hinges or self.pitches:
+        if not self.is_straight or self.hinges or self.pitches or any(s.frame == "rotating" for s in self.supports):
             return False
         places = np.union1d(self.section.knots, self.length)
         places = np.union1d(places, (places[1:] + places[:-1]) / 2)
@@ -380,9 +382,14 @@ class SpatialBeamStructure(BeamStructure):
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
         for i, support in enumerate(self.supports):
             check_on_span(f"supports.{i}.x", support.x, self.length)
-        if self.supports and not self.is_straight:
-            why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
-            raise problem("supports", None, why)
+        for i, x in enumerate(joints := [coupling.x for coupling in self.couplings]):
+            if not 0.0 < x < self.length or x in joints[:i]:
+                raise problem(
+                    f"couplings.{i}.x", x, f"must be between 0 and the length {self.length:g}, one at a place"
+                )
+        for key in ("supports", "couplings"):
+            if getattr(self, key) and not self.is_straight:
+                raise problem(key, None, "need a straight beam: without precone, sweep, line, and hub_offset across it")
         springs = {s.x for s in self.supports if s.holds}
         if self.root.driven and not self.root.free and len(springs) < 2:
             raise problem(

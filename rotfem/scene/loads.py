@@ -364,12 +364,12 @@ class LoadsTable(SceneModel):
 # --- checks against what the loads work on ------------------------------------------------------------------------
 
 
-def check_loads(structure: Any, free_hub: bool, loads: LoadsTable) -> None:
+def check_loads(structure: Any, motion: Any, loads: LoadsTable) -> None:
     """Refuse loads that the structure cannot bear, and what a free hub does not have."""
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
     for i, mass in enumerate(loads.unbalance):
-        if not getattr(structure, "is_straight", False):
+        if not getattr(structure, "is_straight", False) or any(motion.axis[1:]):
             raise problem(
                 f"loads.unbalance.{i}", None, "needs a shaft: a straight spatial_beam that spins about its axis"
             )
@@ -385,7 +385,7 @@ def check_loads(structure: Any, free_hub: bool, loads: LoadsTable) -> None:
         for x in (x for x, _ in vectors if x is not None):
             check_on_span(f"{key}.{load.given[0]}", x, structure.length)
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
-        if free_hub and per_rev is not None:
+        if motion.is_free and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
             raise problem(f"{key}.harmonic.per_rev", per_rev, why)
     known = structure.thickness if structure.type == "plate" and isinstance(structure.thickness, dict) else {}

@@ -224,7 +224,7 @@ class Scene(SceneModel):
             if support.frame == "fixed" and any(motion.axis[1:]):
                 why = "is of a beam that spins about its own axis; those of others stand in the rotating frame"
                 raise problem(f"structure.supports.{i}.frame", "fixed", why)
-        check_loads(structure, motion.is_free, self.loads)
+        check_loads(structure, motion, self.loads)
         check_mesh(structure, self.mesh)
         check_prestress(structure, model)
         check_initial(structure, motion, model, self.initial)

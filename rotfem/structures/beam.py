@@ -62,7 +62,7 @@ class Beam(Structure):
         k = self.degree = grid.degree
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
-        fixed = [at for name in ("masses", "supports") for at in getattr(s, name, ())]
+        fixed = [at for name in ("masses", "supports", "couplings") for at in getattr(s, name, ())]
         points = [*problem.loads.places, *((at.x,) for at in fixed)]
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)

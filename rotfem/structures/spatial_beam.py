@@ -177,7 +177,9 @@ class SpatialBeam(Beam):
         self.extra = tuple(
             f"u{d}_housing_{j}" for j in range(max((len(b.housing) for b in s.supports), default=0)) for d in (2, 3)
         )
-        super().__init__(problem, comm, s.knots, s.nodes)
+        jumping = [name for name in self.components if any(c.of(name)[0] is not None for c in s.couplings)]
+        self.extra += tuple(f"{name}_coupling" for name in jumping)
+        super().__init__(problem, comm, s.knots, (*s.nodes, *(u.x for u in problem.unbalances)))
         self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
@@ -188,7 +190,7 @@ class SpatialBeam(Beam):
         self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
         # behind one hinge turns add up; behind two or three the clamp is one of turns from the hub
-        counted = len(self.active) == len(self.components) and len(self.released) <= 1
+        counted = len(self.active) == len(self.components) and len(self.released) <= 1 and not s.couplings
         self.turns = SectionTurns.of(self) if counted else None
 
     @classmethod
@@ -201,7 +203,7 @@ class SpatialBeam(Beam):
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
             return False
-        if any(support.couples or support.housing for support in data.supports):
+        if data.couplings or any(support.couples or support.housing for support in data.supports):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
@@ -357,19 +359,61 @@ class SpatialBeam(Beam):
                     out[f"support_{i}_{name}"] = K @ d + D @ dd
         return out
 
+    @property
+    def _jumps(self) -> dict[str, int]:
+        """Component that jumps in some coupling ↦ number of its jump among the unknowns of a node."""
+        first = len(self.components)
+        names = enumerate(self.extra, start=first)
+        return {name.removesuffix("_coupling"): i for i, name in names if name.endswith("_coupling")}
+
+    def _kinematics(self, functions: tuple[Any, Any, Any, Any]) -> Kinematics:
+        """Return q, v, a and δq; in an element that begins at a coupling the jump there adds to the values of the node.
+
+        The coupling divides the beam so at a point; at other nodes, and before it, there is no jump.
+        """
+        if not self.data.couplings:
+            return super()._kinematics(functions)
+        space = fem.functionspace(self.mesh, ("DG", 0))
+        beyond = fem.Function(space, name="beyond")
+        begins = self.mesh.geometry.x[self.mesh.geometry.dofmap, 0].min(axis=1)
+        apart = np.abs(begins[:, None] - [coupling.x for coupling in self.data.couplings])
+        beyond.x.array[space.dofmap.list[:, 0]] = np.any(apart < ONE * self.length, axis=1)
+        names, jumps = [*self.components, *self.extra], self._jumps
+        whole = [[f[i] + beyond * f[jumps[n]] if n in jumps else f[i] for i, n in enumerate(names)] for f in functions]
+        q, v, a, dq = map(ufl.as_vector, whole)
+        return Kinematics(q, v, a, dq, made_of=functions)
+
+    def couplings(self, frame: Any) -> list[Support]:
+        """Return the couplings: of jumps across the axis, of turns across it, and of stretch and twist along it."""
+        out, jumps = [], {name: self.k.q[i] for name, i in self._jumps.items()}
+        turns = ufl.as_vector([jumps.get(f"theta{i}", 0) for i in (1, 2, 3)])
+        if not self.problem.theory.linear:
+            turns = self._turn.material_rate(turns)
+        jumps |= {f"theta{i}": turns[i - 1] for i in (1, 2, 3)}
+        for i, c in enumerate(self.data.couplings):
+            at = self.points.measure((c.x,))
+            for first, second in (("u2", "u3"), ("theta2", "theta3"), ("u1", "theta1")):
+                K, D = (
+                    frame.coefficients(f"couplings_{i}_{first}_{kind}", ((a or 0.0, 0.0), (0.0, b or 0.0)))
+                    for kind, a, b in zip(("stiffness", "damping"), c.of(first), c.of(second), strict=True)
+                )
+                x = ufl.as_vector([jumps.get(first, 0), jumps.get(second, 0)])
+                out.append(Support(x, K, D, at, at_rest=False, across=first != "u1"))
+        return out
+
     def _housing(self, j: int) -> tuple[Any, Any]:
         """Return the displacements across the beam of the j-th housing under a support."""
         first = len(self.components) + 2 * j
         return self.k.q[first], self.k.q[first + 1]
 
     def without_extra(self) -> list[npt.NDArray[np.int32]]:
-        """Return of each displacement of a housing the local nodes without such a one."""
-        x, out = self.V.tabulate_dof_coordinates()[:, 0], []
-        for j in range(len(self.extra) // 2):
-            places = [support.x for support in self.data.supports if len(support.housing) > j]
-            away = np.all(np.abs(x[:, None] - places) > ONE * self.length, axis=1)
-            out += 2 * [np.flatnonzero(away).astype(np.int32)]
-        return out
+        """Return of each displacement of a housing, and jump in a coupling, the local nodes without such a one."""
+        x, s = self.V.tabulate_dof_coordinates()[:, 0], self.data
+        jumps = self._jumps
+        places = [[b.x for b in s.supports if len(b.housing) > j // 2] for j in range(len(self.extra) - len(jumps))]
+        places += [[c.x for c in s.couplings if c.of(name)[0] is not None] for name in jumps]
+        away = (np.all(np.abs(x[:, None] - there) > ONE * self.length, axis=1) for there in places)
+        return [np.flatnonzero(a).astype(np.int32) for a in away]
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""

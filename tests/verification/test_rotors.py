@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 import rotfem
 from rotfem.commands.modes import analysis_of
@@ -193,6 +193,15 @@ def test_cross_coupling_makes_forward_whirl_grow() -> None:
         row = by_whirl[way]
         np.testing.assert_allclose(row["growth"], sign * growing.real, rtol=2e-4)
         np.testing.assert_allclose(row["frequency"], abs(growing.imag), rtol=5e-5)
+
+
+def test_damped_bearings_of_a_shaft_that_differs_by_direction() -> None:
+    """In the rotating frame dampers at rest push by the turn of the frame, too: as in the exact theory, 1e-6."""
+    scene = shaft_on_bearings(2e4, 100.0, modes={"count": 4})
+    scene["structure"]["section"] |= {"EI3": 1.3 * EI, "mass_per_length": 1.0}
+    one, other = (rotfem.modes(scene | {"model": {"theory": t}}).rows for t in ("reissner", "consistent_linear"))
+    for name in ("frequency", "growth"):
+        np.testing.assert_allclose(*([row[name] for row in rows] for rows in (one, other)), rtol=1e-6)
 
 
 def test_cross_coupling_leaves_no_plane() -> None:
@@ -493,13 +502,20 @@ def test_internal_damping_turns_with_the_shaft() -> None:
         assert below.rows[0]["growth"] < 0.0 < max(row["growth"] for row in above.rows)
 
 
-def test_torsion_of_a_free_drive_train() -> None:
-    """Three disks on two massless shafts that nothing holds against turning: roots of K − ω² J, 1e-6."""
+@pytest.mark.parametrize("coupling", [None, 3e4])
+def test_torsion_of_a_free_drive_train(coupling: float | None) -> None:
+    """Three disks on two massless shafts that nothing holds against turning: roots of K − ω² J, 1e-6.
+
+    A coupling in each shaft is in series with it.
+    """
     J, k = (4.0, 2.0, 3.0), 2e4
     masses = [{"x": x, "inertia": [[j, 0, 0], [0, j, 0], [0, 0, j]]} for x, j in zip((0.0, 0.5, 1.0), J, strict=True)]
     section = {"EA": 1e9, "GA2": 1e9, "GA3": 1e9, "GJ": 0.5 * k, "EI2": 1e7, "EI3": 1e7, "mass_per_length": 1e-6}
     structure = {"type": "spatial_beam", "length": 1.0, "root": {"driven": True, "free": ["theta1"]}}
     structure |= {"supports": [{"x": x, "stiffness": 1e9} for x in (0.0, 1.0)], "masses": masses, "section": section}
+    if coupling is not None:
+        structure["couplings"] = [{"x": x, "torsion_stiffness": coupling} for x in (0.25, 0.7)]
+        k = 1.0 / (1.0 / k + 1.0 / coupling)
     motion = {"type": "constant", "speed": 10.0, "axis": [1, 0, 0]}
     rows = rotfem.modes({"structure": structure, "motion": motion, "modes": {"count": 3}}).rows
     K = k * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
@@ -547,6 +563,22 @@ def test_tables_of_supports_that_cannot_be(support: dict[str, Any], key: str) ->
         rotfem.Scene.from_dict(tables)
 
 
+@pytest.mark.parametrize(
+    ("coupling", "key"),
+    [
+        ({"x": 1.0, "tilt_stiffness": 1.0}, "x"),
+        ({"x": 0.5}, "stiffness"),
+        ({"x": 0.5, "stiffness": 0.0}, "stiffness"),
+        ({"x": 0.5, "stiffness": 1.0, "tilt_damping": 1.0}, "tilt_damping.*tilt_stiffness"),
+    ],
+)
+def test_couplings_that_cannot_be(coupling: dict[str, Any], key: str) -> None:
+    tables = shaft_on_bearings(1.0)
+    tables["structure"]["couplings"] = [coupling]
+    with pytest.raises(rotfem.SceneError, match=rf"structure\.couplings\.0\.{key}"):
+        rotfem.Scene.from_dict(tables)
+
+
 def test_disk_is_its_mass_and_inertias() -> None:
     """A disk of 280/50 mm, 70 mm wide, of steel, and the same by its numbers."""
     by_size = {"disk": {"outer_diameter": 0.28, "inner_diameter": 0.05, "width": "70 mm", "rho": 7810}}
@@ -588,11 +620,12 @@ def test_housings_in_series() -> None:
         np.block([[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False
     )
     expected = np.sort(values.imag[values.imag > 0.0])[:3]
-    scene = shaft_on_bearings(bearing, modes={"count": 14}, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]})
+    loads = {"unbalance": [{"x": 0.5, "kg_m": 1e-3}], "gravity": [0.0, -1e-3, 0.0]}
+    scene = shaft_on_bearings(bearing, modes={"count": 14}, loads=loads)
     for support in scene["structure"]["supports"]:
         support["housing"] = [{"mass": m, "stiffness": k, "damping": c} for m, k, c in under]
     scene["structure"]["masses"][0]["inertia"] = 1e4  # it does not tilt: both ends move alike, or only their housings
-    for theory in ("reissner", "linear"):
+    for theory in ("reissner", "consistent_linear"):
         found = rotfem.modes(scene | {"model": {"theory": theory}})
         for omega in expected:
             assert np.min(np.abs(found.frequencies - omega)) < 1e-4 * omega
@@ -605,6 +638,36 @@ def test_housings_in_series() -> None:
     history = rotfem.run(scene | {"time": {"end": 0.01, "step": 0.001}, "motion": {**scene["motion"], "speed": speed}})
     assert history.status == "done"
     assert not any("housing" in name for name in history.history)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("frame", ["fixed", "rotating"])
+def test_coupling_across_a_shaft(theory: str, frame: str) -> None:
+    """The overhung disk behind a coupling of stiffness k and 1/s, dampers turning with the shaft: 2e-4, its own mass.
+
+    The coupling adds [[a² / k̂ + s, a / k̂], [a / k̂, 1 / k̂]] to the compliance F of the disk, a before it, with
+    k̂ = k + c (λ − iΩ): det(λ² M − iΩλ G + F⁻¹) = 0; forward whirl grows at 300 rad/s.
+    """
+    k, c, s, a, speed = 2e4, 3.0, 1 / 3e5, 0.3, 300.0
+    motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+    scene = overhung(motion=motion, model={"theory": theory, "frame": frame}, modes={"count": 2})
+    scene["structure"]["section"]["mass_per_length"] = 1e-2
+    coupling = {"x": LENGTH - a, "stiffness": 1 / s, "tilt_stiffness": k, "tilt_damping": c}
+    scene["structure"]["couplings"] = [coupling]
+    rigid = np.array([[LENGTH**3 / 3, LENGTH**2 / 2], [LENGTH**2 / 2, LENGTH]]) / EI + np.diag([s, 0.0])
+    M, G = np.diag([MASS, DIAMETRAL]), np.diag([0.0, POLAR])
+
+    def equation(y: np.ndarray) -> list[float]:
+        lam = complex(*y)
+        F = rigid + np.array([[a * a, a], [a, 1.0]]) / (k + c * (lam - 1j * speed))
+        value = np.linalg.det(lam**2 * M - 1j * speed * lam * G + np.linalg.inv(F)) / 1e8
+        return [value.real, value.imag]
+
+    for row in rotfem.modes(scene).rows:
+        whirl = row["frequency" if frame == "fixed" else "frequency_fixed"]
+        found = np.array([row["growth"], whirl if row["whirl"] == "forward" else -whirl])
+        np.testing.assert_allclose(found, root(equation, found).x, rtol=2e-4, err_msg=row["whirl"])
+        assert (row["growth"] > 0.0) == (row["whirl"] == "forward")
 
 
 def test_a_strut_holds_the_tip_of_a_blade() -> None:
