@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-#: Characters of a value or a key that a message shows, and problems that it lists.
-_LONGEST_VALUE, _MOST_PROBLEMS = 72, 20
+#: Characters of a value or a key that a message shows.
+_LONGEST_VALUE = 72
 
 
 class Fault(NamedTuple):
@@ -91,8 +91,7 @@ class SceneError(InputError):
         file = printable(self.file)
         if not others:
             return f"{file}: {first}"
-        lines = [f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others[:_MOST_PROBLEMS])]
-        return "\n".join(lines if len(others) <= _MOST_PROBLEMS else [*lines, "  …"])
+        return "\n".join([f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others)])
 
 
 class ComputationError(RuntimeError):
