@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-#: Characters of a value or a key that a message shows.
-_LONGEST_VALUE = 72
+#: Characters of a value or a key that a message shows, and problems that it lists.
+_LONGEST_VALUE, _MOST_PROBLEMS = 72, 20
 
 
 class Fault(NamedTuple):
@@ -91,7 +91,9 @@ class SceneError(InputError):
         file = printable(self.file)
         if not others:
             return f"{file}: {first}"
-        return "\n".join([f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others)])
+        return "\n".join(
+            [f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others[:_MOST_PROBLEMS])]
+        )
 
 
 class ComputationError(RuntimeError):

@@ -127,13 +127,9 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not isinstance(value, str | Path) or not str(value):
         raise problem("", value, "must be the path of a file")
     directory = Path((info.context or {}).get("directory", "."))
-    try:
-        path = (directory / value).resolve()
-        found, there = path.is_file(), path.exists()
-    except (OSError, ValueError) as error:
-        raise problem("", str(value), f"must be the path of a file: {error}") from None
-    if not found:
-        what = "is no regular file" if there else "file not found"
+    path = (directory / value).resolve()
+    if not path.is_file():
+        what = "is no regular file" if path.exists() else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
     READ.append(path)
     return path

@@ -202,10 +202,7 @@ def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
         if name not in groups[2]:
             raise BadMesh(f'has no physical surface "{name}" (physical surfaces: {listed(2)})')
     for name in groups[2].keys() - set(surfaces):
-        raise BadMesh(
-            f'its physical surface "{name}" is not part of the plate; with several surfaces give '
-            'structure.thickness as a table of all of them, and with one call it "plate"'
-        )
+        raise BadMesh(f'its physical surface "{name}" is not "plate", and structure.thickness has no such region')
 
 
 def _elements(gmsh: Any, dimension: int, name: str, tag: int) -> tuple[int, Integers]:
@@ -256,10 +253,8 @@ def check_cells(x: Array, cells: Integers, curves: Mapping[str, Integers]) -> No
     clamp = number + np.searchsorted(keys, _keys(curves["clamped"]))
     loose = np.flatnonzero(~np.isin(part[:number], part[clamp]))
     if len(loose):
-        raise BadMesh(
-            f'{len(loose)} of its {number} cells are not connected to the curve "clamped", one of them at '
-            f"{_at(corners[loose[0]])}; parts that meet must share the nodes there (fragment the geometry)"
-        )
+        where = f'are not connected to the curve "clamped", one of them at {_at(corners[loose[0]])}'
+        raise BadMesh(f"{len(loose)} of its {number} cells {where}; parts that meet must share the nodes there")
 
 
 def _keys(ends: Integers) -> Integers:
