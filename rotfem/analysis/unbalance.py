@@ -11,6 +11,7 @@ an ellipse made of a forward circle r_f = ½(y + i z) and a backward one r_b = �
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,13 +73,15 @@ class UnbalanceResponse:
     Args:
         analysis: compiled shaft in the fixed frame.
         found: its unbalances.
+        further: further places, m.
 
     Attributes:
         x: nodes, m, increasing, (nodes,).
         supports: places of the supports, m.
+        places: those of the unbalances, of the supports, and the further ones, m, increasing.
     """
 
-    def __init__(self, analysis: ModalAnalysis, found: tuple[Unbalance, ...]):
+    def __init__(self, analysis: ModalAnalysis, found: tuple[Unbalance, ...], further: Iterable[float] = ()):
         self._analysis, self._system = analysis, analysis.system
         structure, V = analysis.structure, analysis.system.V
         self._across = [list(structure.unknowns).index(name) for name in ("u2", "u3", "theta2", "theta3")]
@@ -90,11 +93,12 @@ class UnbalanceResponse:
             self._force += weights[:, self._across[:2]] @ push
         self._force[self._system.clamped] = 0.0
         self.supports = [support.x for support in structure.data.supports]
-        self._at = [PointValues(V, np.array([x, 0.0, 0.0])) for x in self.supports]
+        self.places = sorted({*(u.x for u in found), *self.supports, *further})
+        self._at = {x: PointValues(V, np.array([x, 0.0, 0.0])) for x in self.places}
         self.x = structure.nodes(self._system.zeros())[0]["x"]
 
-    def at(self, speed: float) -> tuple[Complex, Complex]:
-        """Return displacements u₂, u₃ (m) at the nodes, (2, nodes), and forces of the shaft on supports (N), (2, n).
+    def at(self, speed: float) -> tuple[Complex, Complex, Complex]:
+        """Return u₂, u₃ (m) at the nodes, (2, nodes), and at the places, and forces on supports (N), (2, n).
 
         Args:
             speed: Ω, rad/s.
@@ -108,10 +112,13 @@ class UnbalanceResponse:
         nodes = analysis.structure.nodes(u)[1][:, self._across[:2]].T
         forces = []
         names = list(analysis.structure.unknowns)
-        for support, point in zip(analysis.structure.data.supports, self._at, strict=True):
+        at = {x: point(u) for x, point in self._at.items()}
+        for support in analysis.structure.data.supports:
             K_b, C_b = (frame.coefficient(c, speed) for c in (support.stiffness, support.damping))
-            here, x = point(u), point(u)[self._across[:2]]
+            here = at[support.x]
+            x = here[self._across[:2]]
             if support.housing:  # which the support stands on
                 x = x - here[[names.index(f"u{d}_housing_0") for d in (2, 3)]]
             forces.append((K_b + 1j * speed * C_b) @ x)
-        return nodes, np.array(forces, dtype=np.complex128).reshape(-1, 2).T
+        there = np.array([values[self._across[:2]] for values in at.values()]).T
+        return nodes, there, np.array(forces, dtype=np.complex128).reshape(-1, 2).T

@@ -285,7 +285,7 @@ def test_bearings_and_a_shaft_that_both_differ_by_direction_are_refused() -> Non
         ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
         ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
         ({"supports": [{"x": 0.5}]}, "structure.root.driven"),
-        ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, -2.0]]}]}, "structure.supports.0.stiffness"),
+        ({"supports": [{"x": 0.5, "stiffness": [[100.0, 1e7], [200.0, 2e7]]}]}, "structure.supports.0.stiffness"),
         ({"precone": 0.1}, "structure.supports"),
         ({"root": {"driven": True, "lag_stiffness": 1.0}}, "structure.root.driven"),
     ],
