@@ -27,7 +27,7 @@ from rotfem.errors import ComputationError, InputError, OutputError, SceneError,
 from rotfem.listeners import ONE_PROCESS
 
 if TYPE_CHECKING:
-    from rotfem.results import Result
+    from rotfem.results.result import Result
     from rotfem.results.result_set import ResultFolder, Writer
     from rotfem.scene import Scene
 
