@@ -411,7 +411,7 @@ def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
 def settings(own: Setting) -> Iterator[Setting]:
     """Yield settings from the coarsest on: half the cells, the scene's own, twice them where nothing moves."""
     coarse = on_other_meshes(own)[0]
-    first = own if coarse.factor < 1.0 else coarse.setting
+    first = own if coarse.setting.degree > own.degree else coarse.setting
     if not own.moving:
         yield from dict.fromkeys((first, own, finer(own)))
         return
