@@ -8,7 +8,7 @@ exact theory; the step here, 0.02 s, shifts all of them by the same 6e-5.
     second_order, von_karman               nonlinear, rotations of moderate size
     reissner                               exact
 
-The picture in the README is this demo's, saved with --figure docs/figures/spin_up.png.
+The picture in docs/demos.md is this demo's, saved with --figure docs/figures/spin_up.png.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ Where the model is that of a basis over the whole range, it is exact, and nothin
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,14 +25,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.linalg import norm
+from scipy.linalg import eigh
 from scipy.optimize import brentq, linear_sum_assignment
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.analysis.modal import ModalAnalysis, Spinning, correlation, stability
 from rotfem.analysis.reduced_basis import SpeedModel, between, with_errors
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, repeated
-from rotfem.structures.mode_names import Wave
+from rotfem.numerics.projection import sparse_part
+from rotfem.structures.mode_names import Wave, ordinal_ending
 
 Array = npt.NDArray[Any]
 
@@ -49,6 +53,9 @@ ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
 #: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
 #: multiplied by about its reciprocal.
 NODES_APART = 1e-4
+
+#: Relative difference of matrices that are one, and unknowns of which all synchronous whirls are solved together.
+SAME, MOST_DENSE = 1e-9, 2000
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
@@ -83,37 +90,6 @@ class SpeedPoint:
     def signed(self, branch: int) -> float:
         """Return ω of a branch (rad/s), negative from where it has passed zero."""
         return -self.value(branch).imag if self.conjugate[branch] else self.value(branch).imag
-
-
-def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
-    """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
-
-    With `conjugate` they are those of the modes at a with the modes of λ̄ at b: real matrices have both.
-
-    That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
-    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not
-    distinguished, for any combination of them is a mode too: what counts is how much of the other is in their span,
-    the trace of the product of both projections by the smaller dimension.
-    """
-    ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
-    la, lb = a.nonzero, b.nonzero
-    if conjugate:
-        yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
-    here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
-    own_a, own_b = a.own, b.own.conj() if conjugate else b.own
-    # The two products cancel the unknown scaling of x_b and y_b against each other.
-    scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
-    single = np.abs(here) * np.abs(there.T) / scale
-    groups = [repeated(lam, s.pairs.bounds) for lam, s in ((la, a), (lb, b))]
-    inverses = [np.diag(1.0 / np.where(d := own.diagonal(), d, np.inf)) for own in (own_a, own_b)]
-    for inverse, own, parts in zip(inverses, (own_a, own_b), groups, strict=True):
-        for i in (part for part in parts if len(part) > 1):
-            inverse[np.ix_(i, i)] = np.linalg.pinv(own[np.ix_(i, i)])
-    traces = (inverses[0] @ here @ inverses[1]) * there.T
-    firsts, sizes = ([[i[0] for i in parts] for parts in groups], [[len(i) for i in parts] for parts in groups])
-    sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
-    joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
-    return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
 
 
 def assign(point: SpeedPoint, following: SpeedPoint) -> None:
@@ -374,12 +350,19 @@ class Sweep:
             ranges: of instability (see `onsets`).
         """
         static = [(r["speed"], r["until"] or np.inf) for r in ranges if r["kind"] == "static instability"]
-        wanted, out = list[tuple[int, int, int | None]](), []
+        speeds = [point.speed for point in self.points]
+        own = synchronous(self.analysis, speeds[0], speeds[-1], self.count)
+        wanted = list[tuple[int, int, int | None]]()
+        out = [
+            self._critical(-1, way, 1, 1, x) | {"label": f"{n}{ordinal_ending(n)} {way} whirl"}
+            for x, way, n in own or ()
+        ]
         for i, right in enumerate(self.points[1:]):
             for b in range(self.count):
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
-                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0}))]
+                known = {1} if own is not None and wave is not None and wave.number else set()
+                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0} - known))]
         for (i, b, k), (speeds, solves) in zip(wanted, self.each(wanted, self._meetings), strict=True):
             self.solves += solves
             if not speeds:
@@ -393,8 +376,9 @@ class Sweep:
                         within = [ends for ends in static if ends[0] <= speed <= ends[1]]
                         found = [end for end in (within[0] if within else [speed]) if np.isfinite(end)]
                         out += [self._critical(b, "forward", 1, 0, end) for end in found]
-                elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and way)):
-                    out.append(self._critical(b, way, wave.number, k, speed))
+                elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and wave.number)):
+                    sense = way or ("forward" if wave.share > 0.0 else "backward")
+                    out.append(self._critical(b, sense, wave.number, k, speed))
                 elif k in orders:
                     out.append(self._critical(b, "per_rev", k, k, speed))
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
@@ -500,6 +484,49 @@ class Sweep:
         grows = max((lam.real for lam, _ in growing(path.model.modes(a, count))), default=0.0)
         typical = np.median(np.abs(path.left.spinning.pairs.values))
         return None if after is None and grows > 1e-2 * typical else speed
+
+
+def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) -> list[tuple[float, str, int]] | None:
+    """Return (speed, direction, number among those) of the critical speeds of an undamped shaft; None of other rotors.
+
+    Whirl e^{iΩt} at the speed Ω, at which C = ΩG, is an eigenvector of (K − Ω² (M − iG)) x = 0; all three are constant
+    and the pencil is Hermitian, so that one solution has all of them (Genta 2005, section 4.5), whatever the grid.
+
+    Args:
+        analysis: of the shaft.
+        low: first speed of the range, rad/s.
+        high: last speed.
+        count: number of speeds, at most.
+    """
+    top, names = max(abs(low), abs(high)), list(analysis.structure.unknowns)
+    free = np.tile([n not in ("u1", "theta1") for n in names], analysis.system.V.dofmap.index_map.size_local)
+    if not analysis.fixed or analysis.comm.size > 1 or len(free) > MOST_DENSE or top == 0.0 or analysis.kept.used:
+        return None
+    free[analysis.system.clamped] = False
+    at = [analysis.pencils(speed, analysis.equilibrium(speed))[0] for speed in (0.0, top)]
+    if any(sparse_part(pencil.C) is not pencil.C for pencil in at):
+        return None
+    (M, C_0, K_0), (_, C, K) = ([A[:, :][np.ix_(free, free)] for A in (p.M, p.C, p.K)] for p in at)
+    d = 1.0 / np.sqrt(np.abs(np.diag(K_0)))
+    M, C_0, K_0, C, K = (d[:, None] * A * d for A in (M, C_0, K_0, C, K))
+    damped = max(norm(C_0), norm(C + C.T)) > SAME * top * norm(M)
+    if damped or max(norm(K - K_0), norm(K - K.T)) > SAME * norm(K):
+        return None
+    try:
+        inverse, X = eigh(M - 1j * C / top, K)  # 1/Ω²
+    except np.linalg.LinAlgError:  # nothing holds it
+        return None
+    kind, sense = np.array(names)[np.flatnonzero(free) % len(names)], np.sign(analysis.problem.motion.axis[0])
+    found, X = 1.0 / np.sqrt(inverse[inverse > 0.0])[::-1], (d[:, None] * X)[:, ::-1]
+    y, z, numbers = X[kind == "u2"], X[kind == "u3"] * sense, Counter[str]()
+    out = list[tuple[float, str, int]]()
+    for group in repeated(found, np.zeros(len(found))):
+        with_it, against = (y[:, group] + sign * 1j * z[:, group] for sign in (1.0, -1.0))
+        shares = np.linalg.eigvalsh(with_it.conj().T @ with_it - against.conj().T @ against)
+        for speed, share in zip(found[group].tolist(), shares, strict=True):
+            numbers[way := "forward" if share > 0.0 else "backward"] += 1
+            out += [(signed, way, numbers[way]) for signed in (-speed, speed) if low <= signed <= high]
+    return out[:count]
 
 
 def growing(spinning: Spinning) -> list[tuple[complex, str]]:

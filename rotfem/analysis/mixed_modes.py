@@ -31,7 +31,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.eigenproblem import DIGITS_LOST, Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import ROUNDED, power_of_two, set_diagonal
 from rotfem.numerics.projection import sparse_part, summed
 
@@ -176,11 +176,12 @@ class KeptDigits:
     def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
         """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them."""
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
+        if worst <= DIGITS_LOST or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
             return pairs
         kept, stressed = self._resultants.at_state(pencil.M, pencil.C, pencil.unit or 1.0)
         try:
-            found = kept.solve(count)
+            kept.overdamped = pencil.overdamped
+            found = kept.first(count)
         except ComputationError:
             return pairs
         n = pairs.right.shape[0]

@@ -14,7 +14,7 @@ those of all modes that a structure at rest has add up to its mass r_iᵀ M r_i 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Any
 
@@ -26,13 +26,13 @@ from mpi4py import MPI
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
-from rotfem.equations.modal_damping import massed
+from rotfem.equations.modal_damping import by_family, massed
 from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil, repeated
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil, repeated, separate
 from rotfem.numerics.forms import assembled
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
@@ -156,6 +156,37 @@ class Spinning:
         return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)
 
 
+def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
+    """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
+
+    With `conjugate` they are those of the modes at a with the modes of λ̄ at b: real matrices have both.
+
+    That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
+    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not
+    distinguished, for any combination of them is a mode too: what counts is how much of the other is in their span,
+    the trace of the product of both projections by the smaller dimension.
+    """
+    ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
+    la, lb = a.nonzero, b.nonzero
+    if conjugate:
+        yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
+    here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
+    own_a, own_b = a.own, b.own.conj() if conjugate else b.own
+    # The two products cancel the unknown scaling of x_b and y_b against each other.
+    scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
+    single = np.abs(here) * np.abs(there.T) / scale
+    groups = [repeated(lam, s.pairs.bounds) for lam, s in ((la, a), (lb, b))]
+    inverses = [np.diag(1.0 / np.where(d := own.diagonal(), d, np.inf)) for own in (own_a, own_b)]
+    for inverse, own, parts in zip(inverses, (own_a, own_b), groups, strict=True):
+        for i in (part for part in parts if len(part) > 1):
+            inverse[np.ix_(i, i)] = np.linalg.pinv(own[np.ix_(i, i)])
+    traces = (inverses[0] @ here @ inverses[1]) * there.T
+    firsts, sizes = ([[i[0] for i in parts] for parts in groups], [[len(i) for i in parts] for parts in groups])
+    sums = np.add.reduceat(np.add.reduceat(traces, firsts[0], axis=0), firsts[1], axis=1)
+    joint = np.abs(sums) / np.minimum.outer(*map(np.array, sizes))
+    return joint.repeat(sizes[0], axis=0).repeat(sizes[1], axis=1), single
+
+
 class ModalAnalysis:
     """Compiled once, solved at any speed.
 
@@ -195,6 +226,7 @@ class ModalAnalysis:
         self.free = self.system.hub is not None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
+        self._overdamped = 0 if self.fixed else None
         self.kept = KeptDigits(self.system)
         self.notes = list[str]()
         assembled = self.system.assembled
@@ -232,13 +264,18 @@ class ModalAnalysis:
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.factor = self.system.analysed
-        pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
-        self._unit = pencil.unit
+        pairs = pencil.first(count, clamped.scale() if self.free else 0.0)
+        self._unit, self._overdamped = pencil.unit, pencil.overdamped
         if not self.free:
             pairs = self.kept.better(pencil, pairs, count)
-        self.whirling(pencil, pairs, pairs.right, pairs.left)
+        slowest = int(np.argmin(np.abs(pairs.values)))
+        rigid = self.free and pairs.bounds[slowest] >= 1.0
+        flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
+        pairs = pairs.select(flexible[: massed(clamped.M)])
+        found = Spinning(speed, q, pencil, pairs, clamped, rigid, self.system.reference)
+        self.separate(found)
         if any(support.of_frequency for support in getattr(self.problem.structure, "supports", ())):
-            self._at_own_frequencies(speed, q, pairs)
+            self._at_own_frequencies(found)
         for vectors in (pairs.right, pairs.left):
             vectors[self.system.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
@@ -250,60 +287,50 @@ class ModalAnalysis:
             self.system.analysed = pencil.factor
         if keep:
             pencil.factor = None
-        slowest = int(np.argmin(np.abs(pairs.values)))
-        rigid = self.free and pairs.bounds[slowest] >= 1.0
-        flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
-        chosen = pairs.select(flexible[: massed(clamped.M)])
-        return Spinning(speed, q, pencil, chosen, clamped, rigid, self.system.reference)
+        return found
 
-    def _at_own_frequencies(self, speed: float, q: Array, pairs: Eigenpairs) -> None:
+    def _at_own_frequencies(self, spinning: Spinning) -> None:
         """Solve every mode again with the supports as they are at its own frequency of whirl, in place.
 
         From the frequency of the mode before to 1e-9, or ten times; the mode is the one that is most like it.
         """
-        frame, count = self.model.frame, len(pairs.values)
+        frame, pairs, count = self.model.frame, spinning.pairs, len(spinning.pairs.values)
+        names = ("values", "right", "left", "errors", "bounds")
         for j in range(count):
-            x, lam = pairs.right[:, j].copy(), pairs.values[j]
+            last = replace(spinning, pairs=pairs.select(np.array([j])))
             for _ in range(10):
-                frame.whirl, before = abs(float(lam.imag)), lam
-                pencil = self.pencils(speed, q)[0]
-                found = pencil.solve(count)
-                like = np.abs(summed(self.comm, x.conj() @ found.right)) / np.abs(found.values - lam + 1e-3 * abs(lam))
-                i = int(np.argmax(like))
-                x, lam = found.right[:, i], found.values[i]
-                if abs(lam - before) <= 1e-9 * abs(lam):
+                lam = last.pairs.values[0]
+                frame.whirl = abs(float(lam.imag))
+                pencil, clamped = self.pencils(spinning.speed, spinning.q)
+                found = Spinning(spinning.speed, spinning.q, pencil, pencil.solve(count), clamped)
+                self.separate(found)
+                i = np.argmax(correlation(last, found)[1], axis=1)
+                last = replace(found, pairs=found.pairs.select(i))
+                if abs(last.pairs.values[0] - lam) <= 1e-9 * abs(lam):
                     break
-            pairs.values[j], pairs.right[:, j], pairs.left[:, j] = lam, x, found.left[:, i]
-            pairs.errors[j], pairs.bounds[j] = found.errors[i], found.bounds[i]
+            for name in names:
+                getattr(pairs, name)[..., j] = getattr(last.pairs, name)[..., 0]
         frame.whirl = None
         order = np.argsort(np.abs(pairs.values), kind="stable")
-        for name in ("values", "right", "left", "errors", "bounds"):
+        for name in names:
             getattr(pairs, name)[...] = getattr(pairs, name)[..., order]
 
-    def whirling(self, pencil: Pencil, pairs: Eigenpairs, right: Array, left: Array) -> None:
-        """Make the modes of one frequency of a round shaft that spins circular, forward and backward, in place.
+    def separate(self, spinning: Spinning) -> None:
+        """Choose the shapes of modes of one frequency, in place: of one family each, or forward and backward whirl.
 
-        They are eigenvectors of a turn about its axis, J u = e₁×u, which bearings without preferred directions allow.
-
-        Args:
-            pencil: of the full system.
-            pairs: the modes, whose vectors may be those of a model.
-            right: their right vectors in the full system.
-            left: their left ones.
+        Whirl is an eigenvector of a turn about the axis, J u = e₁×u; i J is Hermitian.
         """
-        if not self.fixed or not self.problem.motion.is_spinning:
-            return
-        size, names = len(self.structure.unknowns), list(self.structure.unknowns)
-        for group in (np.array(g) for g in repeated(pairs.values, pairs.bounds) if len(g) > 1):
-            X, Y, lam = right[:, group], left[:, group], pairs.values[group]
-            x, turned = X.reshape(-1, size, len(group)), np.zeros((len(X) // size, size, len(group)), dtype=complex)
-            for kind in ("u", "theta"):
-                i, j = names.index(f"{kind}2"), names.index(f"{kind}3")
-                turned[:, i], turned[:, j] = -x[:, j], x[:, i]
-            own = pencil.gram(Y, lam, X, lam)
-            V = np.linalg.eig(np.linalg.pinv(own) @ pencil.gram(Y, lam, turned.reshape(X.shape), lam))[1]
-            pairs.right[:, group] = pairs.right[:, group] @ V
-            pairs.left[:, group] = pairs.left[:, group] @ np.linalg.pinv(own @ V).conj().T
+
+        def by_turn(X: Array, MX: Array) -> Array:
+            names, shape = list(self.structure.unknowns), (-1, len(self.structure.unknowns), X.shape[1])
+            x, mx = X.reshape(shape), MX.reshape(shape).conj()
+            pairs = [(names.index(f"{kind}2"), names.index(f"{kind}3")) for kind in ("u", "theta")]
+            out = sum(mx[:, j].T @ x[:, i] - mx[:, i].T @ x[:, j] for i, j in pairs)
+            return np.asarray(1j * summed(self.comm, out))
+
+        whirls = self.fixed and self.problem.motion.is_spinning
+        tell = by_turn if whirls else partial(by_family, self.structure)
+        separate(spinning.pencil, spinning.pairs, (spinning.right, spinning.lifted(spinning.pairs.left)), tell)
 
     def pencils(self, speed: float, q: Array, keep: bool = True) -> tuple[Pencil, Pencil]:
         """Return the pencil about a state q (local dof array) at a speed (rad/s), and the same with the hub held."""
@@ -313,6 +340,7 @@ class ModalAnalysis:
         clamped = Pencil(*matrices)
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         clamped.unit = pencil.unit = self._unit
+        pencil.overdamped = self._overdamped
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
         return pencil, clamped

@@ -4,8 +4,10 @@ With Q(λ; p) = λ² M + λ C + K about the equilibrium q̄(p), and left and rig
 
     dλ/dp = − y^H Q_p x / [ y^H (2λ M + C) x ],     Q_p = dQ(λ; q̄(p), p)/dp
 
-(Adhikari & Friswell 2001). Q_p is the central difference of fourth order, of matrices assembled anew, each about its
-own equilibrium. Matrices are polynomials of most parameters, of a degree at which it is exact.
+(Adhikari & Friswell 2001). Of an eigenvalue that several modes share, the derivatives are the eigenvalues of the matrix
+of these numbers for each two of them (Tisseur 2000, section 2.2). Q_p is the central difference of fourth order, of
+matrices assembled anew, each about its own equilibrium. Matrices are polynomials of most parameters, of a degree at
+which it is exact.
 """
 
 from __future__ import annotations
@@ -15,11 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
+from scipy.optimize import linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.affine import AffineSystem
 from rotfem.equations.modal_damping import DAMPING_KEY
 from rotfem.errors import InputError
+from rotfem.numerics.eigenproblem import repeated
 from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[Any]
@@ -56,7 +60,7 @@ def parameters(analysis: ModalAnalysis, speed: float) -> list[Parameter]:
 
 
 def products(analysis: ModalAnalysis, spinning: Spinning, speed: float) -> Array:
-    """Return y^H Q(λ) x of every pair, with the parameters that are set, about the equilibrium at a speed (rad/s)."""
+    """Return y_i^H Q(λ_j) x_j, (m, m), with the parameters that are set, about the equilibrium at a speed (rad/s)."""
     system, pencil, pairs = analysis.system, spinning.pencil, spinning.pairs
     if system.linear:
         system = AffineSystem(analysis.model, False)
@@ -65,23 +69,29 @@ def products(analysis: ModalAnalysis, spinning: Spinning, speed: float) -> Array
         analysis.equilibrium(speed, spinning)
     M, C, K = (pencil.apply(A, pairs.right) for A in system.mass_damping_stiffness(True))
     Qx = pairs.values**2 * M + pairs.values * C + K
-    return np.asarray(summed(analysis.comm, np.sum(pairs.left.conj() * Qx, axis=0)))
+    return np.asarray(summed(analysis.comm, pairs.left.conj().T @ Qx))
 
 
 def derivatives(analysis: ModalAnalysis, spinning: Spinning, p: Parameter) -> Array:
     """Return dλ/dp of every pair, per unit of p."""
-    unit, own, n = p.value or 1.0, np.array(p.numbers), np.diag(spinning.own)
+    unit, own, pairs = p.value or 1.0, np.array(p.numbers), spinning.pairs
     total: Any = 0.0
     for step, weight in zip(DIFFERENCE_STEPS, WEIGHTS, strict=True):
         if p.numbers is None:
-            total = total + weight * products(analysis, spinning, spinning.speed + step * unit)
+            total = total - weight / unit * products(analysis, spinning, spinning.speed + step * unit)
             continue
         try:
             p.numbers[...] = own * (1.0 + step) if p.value else step
-            total = total + weight * products(analysis, spinning, spinning.speed)
+            total = total - weight / unit * products(analysis, spinning, spinning.speed)
         finally:
             p.numbers[...] = own
-    return np.asarray(-total / unit / n)
+    out: Array = np.diag(total) / np.diag(spinning.own)
+    for group in (np.array(g) for g in repeated(pairs.values, pairs.bounds) if len(g) > 1):
+        each = np.ix_(group, group)
+        slopes, mixed = np.linalg.eig(np.linalg.solve(spinning.own[each], total[each]))
+        _, order = linear_sum_assignment(-np.abs(mixed))  # of the mode that is most of it
+        out[group] = slopes[order]
+    return out
 
 
 def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:

@@ -2,7 +2,8 @@
 
 Knots are the instants at which a signal or its rate may jump: rows of tables, ends of pulses, jumps of functions, and
 `time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
-its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order. Schemes of higher order,
+its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order; where all of them are
+near straight lines already, as tables of what steps resolve, by their values. Schemes of higher order,
 and adaptive steps, take a step with few knots in intervals from one to the next; with more they use lines as well.
 """
 
@@ -17,12 +18,19 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.mechanics.time_signals import Fit, TimeSignal, View
+from rotfem.mechanics.time_signals import SAME, Fit, TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
 #: Most knots in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
 FEW, SHORTEST, CLOSE = 4, 1e-3, 1e-9
+
+#: Distance of a signal from its chord over a step, as a part of its largest value, that a scheme of second order leaves
+#: to itself: that of a wave of 22 steps a period, (ωh)²/8.
+RESOLVED = 1e-2
+
+#: Steps for each knot from which on straight lines in those with knots, each as dear as four, cost no third of a march.
+RARE = 12
 
 #: Smallest change, as a part of the largest value, that is searched for a jump; halvings that confirm one.
 JUMP, CONFIRMED = 1e-3, 10
@@ -53,14 +61,7 @@ class Interval:
 
 
 def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
-    """Yield the intervals of all steps.
-
-    Args:
-        knots: of the prescribed data, s.
-        times: ends of the steps, the first the start of the march, s.
-        step: nominal length of a step, s.
-        divided: whether steps are taken from knot to knot where these are few.
-    """
+    """Yield the intervals of steps between times (s), nominally `step` long (s), `divided` at few knots (s)."""
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]
@@ -83,12 +84,34 @@ def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterato
             begin = stop
 
 
-def knots_of(signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = ()) -> Array:
-    """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints."""
+def knots_of(
+    signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = (), divided: bool = True
+) -> Array:
+    """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
+
+    Steps of second order (not `divided`, see `intervals`) do without those that they resolve, others without kinks of
+    rates if these are many.
+    """
     for signal in signals:
         find_jumps(signal, times, breakpoints)
-    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *(s.knots for s in signals)]))
+    rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
+    of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
+    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
     return found
+
+
+def unresolved(signal: TimeSignal, times: Array) -> Array:
+    """Return the knots (s) of a signal that are rare, or in steps between times (s) in which it jumps or is bent."""
+    knots: Array = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
+    if RARE * len(knots) < len(times):
+        return knots
+    f, (before, after) = signal.values(times), (signal.values(knots * (1 + side * SAME)) for side in (-1, 1))
+    step = np.clip(np.searchsorted(times, knots), 1, len(times) - 1)
+    share = ((knots - times[step - 1]) / (times[step] - times[step - 1]))[:, None]
+    chord, size = (1 - share) * f[step - 1] + share * f[step], max(np.abs(x).max() for x in (f, before, after))
+    jumps = np.linalg.norm(after - before, axis=1) > CLOSE * size
+    off = np.linalg.norm(before - chord, axis=1) > RESOLVED * size
+    return np.asarray(knots[np.isin(step, step[jumps | off])])
 
 
 def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:

@@ -90,7 +90,6 @@ class UnbalanceResponse:
             self._force += weights[:, self._across[:2]] @ push
         self._force[self._system.clamped] = 0.0
         self.supports = [support.x for support in structure.data.supports]
-        self._at = [PointValues(V, np.array([x, 0.0, 0.0])) for x in self.supports]
         self.x = structure.nodes(self._system.zeros())[0]["x"]
 
     def at(self, speed: float) -> tuple[Complex, Complex]:
@@ -106,12 +105,6 @@ class UnbalanceResponse:
         solver.factor((1.0, 1j * speed, -(speed**2)))
         u = solver.solve(np.asarray(self._force * speed**2, dtype=np.complex128))
         nodes = analysis.structure.nodes(u)[1][:, self._across[:2]].T
-        forces = []
-        names = list(analysis.structure.unknowns)
-        for support, point in zip(analysis.structure.data.supports, self._at, strict=True):
-            K_b, C_b = (frame.coefficient(c, speed) for c in (support.stiffness, support.damping))
-            here, x = point(u), point(u)[self._across[:2]]
-            if support.housing:  # which the support stands on
-                x = x - here[[names.index(f"u{d}_housing_0") for d in (2, 3)]]
-            forces.append((K_b + 1j * speed * C_b) @ x)
-        return nodes, np.array(forces, dtype=np.complex128).reshape(-1, 2).T
+        forces = analysis.structure.support_forces(frame, speed, u, 1j * speed * u)
+        both = [forces[f"support_{i}_f"] for i in range(len(self.supports))]
+        return nodes, np.array(both, dtype=np.complex128).reshape(-1, 2).T

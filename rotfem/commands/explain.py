@@ -38,8 +38,8 @@ from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
-from rotfem.results import ExplainResult
 from rotfem.results.distance import Series, Spectrum
+from rotfem.results.of_scene import ExplainResult
 from rotfem.scene import Scene, as_scene
 
 Array = npt.NDArray[Any]

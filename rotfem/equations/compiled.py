@@ -41,8 +41,9 @@ def compile_system(
         why = "depend on the frequency of whirl, which a history does not have; modes, campbell and unbalance take them"
         raise InputError("structure.supports", None, why)
     view = View()
-    seen, signals = viewed(problem.pushed(), view) if moving else (problem, [])
-    model = Model(seen, comm)
+    free = problem.motion.hub is not None  # whose angle is an unknown of the model
+    seen, signals = viewed(problem if free else problem.pushed(problem.motion), view) if moving else (problem, [])
+    model = Model(seen, comm, moving)
     if problem.theory.linear and moving:  # its pieces are held apart, 12 kB for each unknown of a plate
         V, file = model.structure.V, getattr(problem.structure, "mesh", None)
         key, value = ("mesh.elements", problem.mesh.elements) if file is None else ("structure.mesh", str(file))

@@ -4,7 +4,8 @@ It is the virtual work of all effects in a rigid turn δx = e×x δpsi about the
 
     I_R psi'' + c psi' + (work in the turn) = M(t),
 
-which is the balance of angular momentum of hub and structure, exactly and for every theory.
+which is the balance of angular momentum of hub and structure, exactly and for every theory. An unbalance m ε n at x_c
+pushes the structure, and takes from the drive the moment m ε e·(n×ẍ_c).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from rotfem.mechanics import work
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, assembled, weighted
 from rotfem.numerics.projection import summed
+from rotfem.structures.structure import PointValues
 
 Array = npt.NDArray[np.float64]
 
@@ -103,6 +105,23 @@ class HubRow:
         self._forms = model.derived_forms(purpose, make, more, once=False)[1]
         self.has_outside, self._momentum = "outside" in self._forms, None
         self._vector = compat.create_vector(model.structure.V)
+        places = (np.array([u.x, 0.0, 0.0]) for u in model.reacting)
+        self._unbalances = [(u, PointValues(model.structure.V, x)) for u, x in zip(model.reacting, places, strict=True)]
+
+    def _reaction(self) -> tuple[float, Array]:
+        """Return Σ m ε e·(n×ẍ_c) of unbalances, N·m, and its derivative to the owned unknowns of a."""
+        t, structure, (psi, speed, rate) = self.model.time, self.model.structure, self.angle.values
+        moment, by_a = 0.0, np.zeros(self._vector.getLocalSize())
+        across = [structure.unknowns.index(name) for name in ("u2", "u3") if self._unbalances]
+        for u, at in self._unbalances if self.coupled else ():
+            if t > u.start:
+                (x, v, a), sense = (complex(*at(y)[across]) for y in self._state), float(self.model.motion.axis[0])
+                n = u.moment * sense * np.exp(1j * (u.phase + (sense * psi if self.model.frame.spun else 0.0)))
+                if not self.model.frame.spun:
+                    a += 2j * sense * speed * v + (1j * sense * rate - speed**2) * x
+                moment += (n.conjugate() * a).imag
+                by_a += at.columns(len(by_a))[:, across] @ [-n.imag, n.real]
+        return moment, by_a
 
     def _value(self, form: Any) -> float:
         """Evaluate a functional; of an uncoupled hub with the structure undeformed and at rest in the frame."""
@@ -135,8 +154,8 @@ class HubRow:
         return float(psi), float(speed), dict(zip(s.components, map(float, tip), strict=True))
 
     def work(self) -> float:
-        """Return the work of the structure in the rigid turn, N·m."""
-        return self._value(self._forms["moment"])
+        """Return the work of the structure and its unbalances in the rigid turn, N·m."""
+        return self._value(self._forms["moment"]) + self._reaction()[0]
 
     def diagonal(self, c_v: float, c_m: float) -> float:
         """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
@@ -158,11 +177,14 @@ class HubRow:
             return self._vector
         for constant, value in zip(self._shifts, shifts, strict=True):
             constant.value = value
-        return assembled(self._forms["row"], self.model.structure.V, self._clamped, self._vector)
+        out = assembled(self._forms["row"], self.model.structure.V, self._clamped, self._vector)
+        if self._unbalances:
+            out.array[:] += shifts[2] * self._reaction()[1]
+        return out
 
     def outside(self) -> float:
         """Return the moment of all external forces but torque and brake (N·m)."""
-        return -self._value(self._forms["outside"])
+        return -self._value(self._forms["outside"]) - self._reaction()[0]
 
     def angular_momentum(self) -> float:
         """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""

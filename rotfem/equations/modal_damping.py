@@ -1,7 +1,6 @@
 """Damping by mode: a ratio for each of the first modes at rest, as blade files give it.
 
-With modes φ_j of unit mass, M φ_j ω_j² = K φ_j, of the structure at rest (see `ModesAtRest`), the
-force of damping is C v with
+With modes φ_j of unit mass, M φ_j ω_j² = K φ_j, of the structure at rest, the force of damping is C v with
 
     C = Σ_j 2 ζ_j ω_j (M φ_j)(M φ_j)ᵀ = B Bᵀ,
 
@@ -13,7 +12,6 @@ dense, and kept as B (see `rotfem.numerics.projection`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from mpi4py import MPI
 
 from rotfem.equations.model import Model
 from rotfem.errors import InputError
-from rotfem.numerics.eigenproblem import Pencil
+from rotfem.numerics.eigenproblem import Pencil, separate
 from rotfem.numerics.projection import LowRank, summed, times
 from rotfem.numerics.ritz import MORE
 from rotfem.structures.structure import Structure
@@ -42,54 +40,22 @@ DAMPING_KEY = "structure.damping.modal"
 MODES_OF_ONE_RATIO = 10
 
 
-@dataclass(frozen=True)
-class ModesAtRest:
-    """Modes of K x = ω² M x, the slowest first.
+def modes_at_rest(structure: Structure, matrices: tuple[Any, Any], count: int) -> tuple[Array, Array, Array]:
+    """Return ω (rad/s), shapes φ of unit mass and M φ of the first modes that vibrate, as many as there are of them.
 
-    Attributes:
-        omega: ω, rad/s, (m,).
-        shapes: x of unit mass, x·M x = 1, owned unknowns, (n, m).
-        massed: M x, (n, m).
-    """
-
-    omega: Array
-    shapes: Array
-    massed: Array
-
-
-def modes_at_rest(structure: Structure, matrices: tuple[Any, Any], count: int) -> ModesAtRest:
-    """Return the first modes that vibrate of (M, K) of a structure at rest, as many as wanted or as there are.
-
-    Shapes of equal frequency are combined so that each belongs to one family, if possible.
+    Args:
+        structure: at rest.
+        matrices: its M and K.
+        count: number of modes.
     """
     M, K = matrices
-    count = min(count, massed(M))
-    pairs = Pencil(M, M.duplicate(), K).solve(min(count + MORE, massed(M)))
-    vibrates, omegas, columns = pairs.resolved != 0.0, [], []  # others are motions that nothing holds
-    omega = np.abs(pairs.values[vibrates])
-    # Of frequencies that are one any turn of the shapes is one.
-    for group in np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > 1e-6 * omega[1:])):
-        X = _real_span(structure.comm, M, pairs.right[:, vibrates][:, group])
-        energies = family_products(structure, X, times(M, X))
-        distinguished = sum(i * energy for i, energy in enumerate(energies.values()))
-        columns.append(X @ np.linalg.eigh(_symmetric(np.asarray(distinguished)))[1])
-        omegas += [float(np.mean(omega[group]))] * X.shape[1]
-    X = np.hstack(columns)[:, :count]
-    return ModesAtRest(np.array(omegas[:count]), X, times(M, X))
-
-
-def _real_span(comm: MPI.Comm, M: Any, X: Array) -> Array:
-    """Return real columns V, V·M V = 1, that span complex ones, eigenvectors of one frequency."""
-    parts = np.hstack([X.real, X.imag]) / np.sqrt(_energies(comm, M, X.real) + _energies(comm, M, X.imag)).max()
-    sizes, turns = np.linalg.eigh(_symmetric(summed(comm, parts.T @ times(M, parts))))
-    keep = sizes > 1e-6 * sizes[-1]
-    V = np.asarray(parts @ (turns[:, keep] / np.sqrt(sizes[keep])))
-    return np.asarray(V / np.sqrt(_energies(comm, M, V)))
-
-
-def _energies(comm: MPI.Comm, M: Any, X: Array) -> Array:
-    """Return x·M x of real columns."""
-    return np.asarray(summed(comm, np.sum(X * times(M, X), axis=0)))
+    most = massed(M)
+    pencil = Pencil(M, M.duplicate(), K)
+    pairs = pencil.solve(min(min(count, most) + MORE, most))
+    separate(pencil, pairs, (pairs.right, pairs.left), lambda X, MX: by_family(structure, X, MX))
+    first = np.flatnonzero(pairs.resolved != 0.0)[:count]  # others are motions that nothing holds
+    shapes = pairs.right[:, first].real
+    return np.abs(pairs.values[first]), shapes, times(M, shapes)
 
 
 def massed(M: Any) -> int:
@@ -109,8 +75,9 @@ def family_products(structure: Structure, X: Array, MX: Array) -> dict[str, Arra
     }
 
 
-def _symmetric(A: Array) -> Array:
-    return 0.5 * (A + A.T)
+def by_family(structure: Structure, X: Array, MX: Array) -> Array:
+    """Return x_i^H M A x_j, over all ranks, of the operator A that multiplies components by the number of a family."""
+    return np.asarray(sum(i * part for i, part in enumerate(family_products(structure, X, MX).values())))
 
 
 class ByMode(LowRank):
@@ -140,14 +107,13 @@ def damping_by_mode(model: Model, matrices: Callable[[], tuple[Any, Any]]) -> By
     ratios = damping.modal
     if model.fixed:
         raise InputError(DAMPING_KEY, ratios, 'needs model.frame = "rotating": modes at rest turn with the hub')
-    modes, zeta = damped_modes(model, matrices(), ratios)
-    damped = np.flatnonzero(zeta)
-    weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
-    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], model.comm)
+    omega, zeta, shapes, momenta = damped_modes(model, matrices(), ratios)
+    weights = np.sqrt(2 * zeta * omega)
+    return ByMode(momenta * weights, shapes * weights, omega, model.comm)
 
 
-def damped_modes(model: Model, matrices: tuple[Any, Any], ratios: Ratios) -> tuple[ModesAtRest, Array]:
-    """Return (modes, their ratios) in the order of frequency, or of each family in that order.
+def damped_modes(model: Model, matrices: tuple[Any, Any], ratios: Ratios) -> tuple[Array, Array, Array, Array]:
+    """Return ω, ratios ζ, φ and M φ of modes that have a ratio: in the order of frequency, or of each family in that.
 
     A mode is in the family that has most of its energy.
     """
@@ -162,25 +128,26 @@ def damped_modes(model: Model, matrices: tuple[Any, Any], ratios: Ratios) -> tup
         named = {"": ratios if isinstance(ratios, tuple) else (ratios,) * MODES_OF_ONE_RATIO}
     count = sum(map(len, named.values())) + (MODES_OF_ONE_RATIO if isinstance(ratios, Mapping) else 0)
     while True:
-        modes = modes_at_rest(structure, matrices, count)
-        energies = family_products(structure, modes.shapes, modes.massed)
+        omega, shapes, momenta = modes_at_rest(structure, matrices, count)
+        energies = family_products(structure, shapes, momenta)
         leading = np.argmax([np.diag(energy) for energy in energies.values()], axis=0)
         of = {f"{name} ": np.flatnonzero(leading == i) for i, name in enumerate(energies)}
         of[""] = np.arange(len(leading))
         short = [name for name, given in named.items() if len(of[name]) < len(given)]
-        if not short or (len(modes.omega) < count and not (several and is_whole(model))):
+        if not short or (len(omega) < count and not (several and is_whole(model))):
             break
-        if len(modes.omega) < count:
+        if len(omega) < count:
             name = short[0]
             value = list(named[name]) if name else ratios
             why = f"has more ratios than there are {name}modes on this mesh: {len(of[name])}"
             raise InputError(f"{DAMPING_KEY}.{name}".rstrip(". "), value, why)
         count *= 2
-    zeta = np.zeros(len(modes.omega))
+    zeta = np.zeros(len(omega))
     for name, given in named.items():
         found = of[name][: len(given)]
         zeta[found] = given[: len(found)]
-    return modes, zeta
+    damped = np.flatnonzero(zeta)
+    return omega[damped], zeta[damped], shapes[:, damped], momenta[:, damped]
 
 
 def is_whole(model: Model) -> bool:

@@ -470,6 +470,15 @@ class System(ABC):
             found = dict(zip(found, map(float, turned), strict=True))
         return found
 
+    def support_forces(self) -> dict[str, float]:
+        """Return the forces (N) and moments (N·m) of the structure on its supports at the state and time set.
+
+        Keys are support_0_f2, support_0_f3, …, components in the frame.
+        """
+        state, speed = (self.structure.total(self.q.x.array), self.v.x.array), float(self.motion.speed(self.time))
+        found = self.structure.support_forces(self.model.frame, speed, *state)
+        return {f"{name}{i}": float(x) for name, f in found.items() for i, x in zip((2, 3), f, strict=True)}
+
     def check_inside_out(self, time: float | None = None) -> None:
         """Refuse a state that is set and turned inside out, which Newton's method may have led to."""
         if not self.linear and self.model.inside_out():

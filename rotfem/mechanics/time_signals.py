@@ -15,11 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss, legvander
+from numpy.polynomial.polynomial import polyval
 
 from rotfem.mechanics.free_hub import Torque
 from rotfem.mechanics.loads import Load, PlaceLoad
@@ -37,6 +39,9 @@ Fit = tuple[float, float, int]
 #: Gauss points and weights on (0, 1): exact for polynomials of degree 7, as a cubic times one.
 POINTS, WEIGHTS = (x / 2 for x in leggauss(4))
 POINTS = POINTS + 0.5
+
+#: Column k: coefficients of the powers of x in (2k + 1) P_k, up to cubics.
+LEGENDRE = np.array([[1.0, 0.0, -2.5, 0.0], [0.0, 3.0, 0.0, -10.5], [0.0, 0.0, 7.5, 0.0], [0.0, 0.0, 0.0, 17.5]])
 
 
 @dataclass
@@ -71,6 +76,7 @@ class TimeSignal:
         at: time (s) ↦ value, scalar or shape (components,).
         knots: times (s) at which it or its rate may jump, increasing.
         smooth: further times (s) between which it is a polynomial, or nearly one.
+        bent: those of them at which its rate has a kink, which takes two orders from an adaptive step over it.
         many: the same of an array of times, shape (n, components); made of `at` if None.
         known: whether all knots are known; else jumps are searched.
         continuous: whether it must not jump, as speeds and angles.
@@ -81,11 +87,20 @@ class TimeSignal:
     at: Callable[[float], Any]
     knots: Array
     smooth: Array = field(default_factory=lambda: np.empty(0))
+    bent: Array = field(default_factory=lambda: np.empty(0))
     many: Callable[[Array], Array] | None = None
     known: bool = True
     continuous: bool = False
     view: View = field(default_factory=View)
     _fit: tuple[Fit, Array] | None = None
+
+    @cached_property
+    def _points(self) -> Array:
+        return np.union1d(self.knots, self.smooth)
+
+    @cached_property
+    def _is_number(self) -> bool:
+        return np.ndim(self.at(0.0)) == 0
 
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
@@ -95,15 +110,21 @@ class TimeSignal:
 
     def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
-        middle, h = 0.5 * (begin + end), end - begin
+        x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
+        return np.asarray(polyval(x, self._powers(begin, end, degree)), dtype=np.float64).T
+
+    def _powers(self, begin: float, end: float, degree: int) -> Array:
+        """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
         if self._fit is None or self._fit[0] != (begin, end, degree):
-            points = np.union1d(self.knots, self.smooth)
-            edges = np.array([begin, *points[(points > begin) & (points < end)], end])
+            middle, h = 0.5 * (begin + end), end - begin
+            first, last = np.searchsorted(self._points, (begin, end), side="right")
+            inside = self._points[first:last]
+            edges = np.array([begin, *inside[inside < end], end])
             s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
             weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
             moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
-            self._fit = (begin, end, degree), (2 * np.arange(degree + 1) + 1)[:, None] * moments
-        return legvander((t - middle) * (2 / h), degree) @ self._fit[1]
+            self._fit = (begin, end, degree), LEGENDRE[: degree + 1, : degree + 1] @ moments
+        return self._fit[1]
 
     def deviation(self, t: Array, begin: float, end: float, degree: int) -> Array:
         """Return |f − f̄| at times (n,) of a step, as parts of the largest |f| there."""
@@ -114,8 +135,9 @@ class TimeSignal:
     def seen(self, t: float) -> Any:
         """Return the value at a time (s), evaluated as the view says."""
         if self.view.line is not None:
-            value = self.fitted(np.array([t]), *self.view.line)[0]
-            return float(value[0]) if np.ndim(self.at(t)) == 0 else value
+            begin, end, _ = self.view.line
+            value = np.asarray(polyval((2 * t - begin - end) / (end - begin), self._powers(*self.view.line)))
+            return float(value[0]) if self._is_number else value
         return self.at(t + self.view.side * SAME * (abs(t) or SAME)) if self.view.side else self.at(t)
 
 
@@ -160,17 +182,15 @@ def _viewed_load(name: str, load: Load, see: Callable[..., TimeSignal]) -> Load:
 def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
     """Return a motion, evaluated as a view says; speed, pitch and its rate must not jump."""
     changes: dict[str, Any] = {}
-    if motion.is_accelerated and not motion.constant:
-        base, at = motion.base_knots, motion.base_acceleration
-        changes["base_acceleration"] = see(
-            "motion.base_acceleration", at, base, many=_between(at, base), known=base is not None
-        ).seen
+    if motion.base is not None and not motion.base.constant:
+        changes["base"] = _viewed_load("motion.base_acceleration", motion.base, see)
     if motion.hub is not None:
         if len((torque := motion.hub.torque).knots):
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
             changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:
-        more = {"smooth": np.array(motion.knots), "known": motion.smooth or motion.breakpoints is not None}
+        more: dict[str, Any] = {"smooth": np.array(motion.knots), "bent": np.array(motion.bent)}
+        more |= {"known": motion.smooth or motion.breakpoints is not None}
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
             signal = see(f"motion.{name}", f, motion.sharp, many=many, continuous=name == "speed", **more)
@@ -181,11 +201,3 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
             turned[name] = see(key, f, pitch.knots, known=pitch.known, continuous=name != "acceleration").seen
         changes["pitch"] = replace(pitch, **turned)
     return replace(motion, **changes)
-
-
-def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:
-    """Return a signal of an array of times that is linear between knots; None where it is not, or jumps there."""
-    if not knots or np.any(np.diff(knots) <= 0.0):
-        return None
-    columns = np.array([at(t) for t in knots], dtype=float).T
-    return lambda t: np.stack([np.interp(t, knots, column) for column in columns], axis=1)

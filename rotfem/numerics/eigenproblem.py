@@ -15,6 +15,7 @@ and rows are added up.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -41,6 +42,11 @@ from rotfem.numerics.linear import (
 )
 from rotfem.numerics.projection import Sendable, sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
+
+Array = npt.NDArray[Any]
+
+#: Relative bound of the error of λ above which what spoils it is looked at, which takes another factor.
+DIGITS_LOST = 1e-5
 
 
 class RoundOff:
@@ -113,8 +119,23 @@ class RoundOff:
                 self.stiffness(left, right) + summed(p.comm, np.sum(np.abs(left) * ROUNDED * inertia, axis=0))
             ) / size
             # Of the residual's part, where it is taken off, at most ten times its square is left of isolated modes.
-            first_order = rounded + solved * np.where(near, np.minimum(1.0, 10.0 * solved / isolation(values)), 1.0)
-        return values, relative(np.where(np.isfinite(first_order), first_order, np.inf))
+            left_over = solved * np.where(near, np.minimum(1.0, 10.0 * solved / isolation(values)), 1.0)
+            if np.any(left_over > DIGITS_LOST):  # residuals of stiff directions: ten times their energy is left
+                left_over = np.where(near, np.minimum(left_over, 10.0 * self._energies(residual) / size), left_over)
+        first_order = np.where(np.isfinite(rounded + left_over), rounded + left_over, np.inf)
+        return values, relative(first_order)
+
+    def _energies(self, residual: Array) -> Array:
+        """Return |r^H K⁻¹ r| of residuals, infinite where K is singular."""
+        p = self.pencil
+        (_, _, K), d = balanced(p.M, p.C, p.K, 1.0, p.unknowns)
+        r = d[:, None] * residual
+        try:
+            solver = DirectSolver(K, pivots=p.pivots)
+            x = solver.solve_all(r.real) + 1j * solver.solve_all(r.imag)
+        except ComputationError:
+            return np.full(r.shape[1], np.inf)
+        return np.asarray(np.abs(summed(p.comm, np.sum(r.conj() * x, axis=0))))
 
 
 def isolation(values: Array) -> Array:
@@ -133,9 +154,6 @@ def relative(first_order: Array) -> Array:
     """
     t = 2 * first_order
     return np.where(t < 1.0, 1.0 - np.sqrt(np.maximum(1.0 - t, 0.0)), np.sqrt(np.minimum(t, 1e12)))
-
-
-Array = npt.NDArray[Any]
 
 
 def mirrored(values: Array, right: Array) -> Array:
@@ -204,6 +222,11 @@ class Eigenpairs:
         """λ, shape (m,); zero where it is so to round-off."""
         return np.where(self.bounds < 1.0, self.values, 0.0)
 
+    @property
+    def overdamped(self) -> Array:
+        """Which of them do not vibrate but die away, shape (m,)."""
+        return np.asarray((self.values.imag == 0.0) & (self.values.real < 0.0) & (self.bounds < 1.0))
+
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
         vectors = self.right[:, index], self.left[:, index]
@@ -219,6 +242,35 @@ def repeated(values: Array, bounds: Array) -> list[list[int]]:
     for i, same in enumerate(one.tolist(), start=1):
         out[-1].append(i) if same else out.append([i])
     return out
+
+
+def separate(pencil: Pencil, pairs: Eigenpairs, vectors: tuple[Array, Array], tell: Callable[..., Array]) -> None:
+    """Choose the vectors of eigenvalues that are one, in place: orthogonal in M, and eigenvectors of another operator.
+
+    Without C, and with M and K symmetric, all right vectors are made real, of unit mass. Left ones follow, so that
+    y_i^H [(λ_i + λ_j) M + C] x_j is 1 or 0.
+
+    Args:
+        pencil: M, C and K.
+        pairs: whose vectors may be coordinates in a real basis.
+        vectors: right and left ones of the pencil.
+        tell: (X, M X) ↦ X^H M A X of a symmetric operator M A that tells vectors apart, over all ranks, (m, m).
+    """
+    right, left = vectors
+    standing = pencil.conservative and pencil.C.norm(PETSc.NormType.INFINITY) == 0.0
+    for group in (np.array(g) for g in repeated(pairs.values, pairs.bounds) if standing or len(g) > 1):
+        X, x, m = right[:, group], pairs.right[:, group], len(group)
+        if standing:
+            parts = np.hstack([X.real, X.imag])
+            sizes, turns = np.linalg.eigh(summed(pencil.comm, parts.T @ times(pencil.M, parts)))
+            turns = turns[:, -m:] / np.sqrt(sizes[-m:])
+            X, x = parts @ turns, np.hstack([x.real, x.imag]) @ turns
+        MX = pencil.apply(pencil.M, X)
+        unit = np.linalg.inv(np.linalg.cholesky(summed(pencil.comm, X.conj().T @ MX)))
+        V = unit.conj().T @ np.linalg.eigh(unit @ tell(X, MX) @ unit.conj().T)[1]
+        lam = np.where(pairs.bounds[group] < 1.0, pairs.values[group], 1j)  # of zero any other one
+        Y = np.linalg.pinv(pencil.gram(left[:, group], lam, X @ V, lam)).conj().T
+        pairs.right[:, group], pairs.left[:, group] = x @ V, pairs.left[:, group] @ Y
 
 
 def backward_errors(pencil: Pencil, values: Array, X: Array) -> Array:
@@ -262,9 +314,11 @@ class Pencil(Sendable):
     Attributes:
         owner: kept alive with the matrices.
         factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
+        overdamped: number of overdamped pairs that are expected among others of a shaft; None of other structures.
     """
 
     factor: DirectSolver | None = None
+    overdamped: int | None = None
 
     def __init__(self, M: Any, C: Any, K: Any):
         self.M, self.C, self.K = M, C, K
@@ -336,6 +390,17 @@ class Pencil(Sendable):
         lam = pairs.values
         opposite = np.abs(lam[1:] + lam[:-1]) < ZERO_EIGENVALUE * np.abs(lam[1:])
         return pairs.select(np.flatnonzero(np.append(True, ~opposite | (pairs.bounds[1:] < 1.0))[: len(lam)]))
+
+    def first(self, count: int, target: float = 0.0) -> Eigenpairs:
+        """Return pairs as `solve` does; of a shaft `count` of them are not overdamped, and those that are come last."""
+        if self.overdamped is None:
+            return self.solve(count, target)
+        pairs = self.solve(count + self.overdamped, target)
+        with suppress(ComputationError):  # where further ones are inaccurate, there are no more
+            while (over := int(np.sum(pairs.overdamped))) > self.overdamped:
+                pairs = self.solve(count + over, target)
+                self.overdamped = over
+        return pairs.select(np.argsort(pairs.overdamped, kind="stable"))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
         if sparse_part(self.C) is not self.C:  # SLEPc's solver takes sparse matrices alone

@@ -49,7 +49,7 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
 def restrained(K: Any, numbers: npt.NDArray[Any]) -> None:
     """Hold unknowns of these numbers in a stiffness matrix, by springs as stiff as it is there."""
     d = K.getDiagonal()
-    d.array[numbers] *= 2.0
+    d.array[numbers] = np.where(d.array[numbers] == 0.0, 1.0, 2.0 * d.array[numbers])
     K.setDiagonal(d)
 
 
@@ -83,6 +83,7 @@ class DirectSolver:
         A: assembled PETSc matrix, or `PlusLowRank`, of which the sparse part is factorised.
         symmetric: whether it is symmetric.
         counting: whether its negative eigenvalues are counted whatever its size.
+        pivots: whether a factor needs pivots.
 
     Attributes:
         negative: number of negative eigenvalues of A, by the signs of its pivots (Sylvester); None where none are
@@ -91,7 +92,7 @@ class DirectSolver:
 
     negative: int | None = None
 
-    def __init__(self, A: Any, symmetric: bool = False, counting: bool = False):
+    def __init__(self, A: Any, symmetric: bool = False, counting: bool = False, pivots: bool = False):
         self._whole, self.A, self.factorisations = A, sparse_part(A), 0
         self._update: Update | None = None
         A = self.A
@@ -101,7 +102,7 @@ class DirectSolver:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         size = A.getSize()[0]
         wide = symmetric and A.comm.size == 1 and A.getInfo()["nz_used"] > 50 * size
-        use_direct_solver(self._ksp, size, symmetric, small=0 if counting else MIDDLE if wide else SMALL)
+        use_direct_solver(self._ksp, size, symmetric, pivots, small=0 if counting else MIDDLE if wide else SMALL)
         self._ksp.setErrorIfNotConverged(False)
         self._counting = self._ksp.getPC().getType() == PETSc.PC.Type.CHOLESKY
         self._definite: bool = A.comm.size == 1  # as long as no factor has shown another thing

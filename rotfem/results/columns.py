@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.registry import outputs
-from rotfem.results.files import csv_text, whole_hdf5
+from rotfem.results.files import csv_text
 from rotfem.units import quantity
 
 if TYPE_CHECKING:
@@ -82,16 +81,18 @@ COLUMNS = {
     "angle": ("angle of the larger semi-axis from direction 2", "rad"),
     "probe": ("amplitude that a probe reads", "m"),
     **{f"f{i}": (f"force of the shaft on a support, f{_SUB[i]}", "N") for i in "23"},
-    "frequency": ("frequency in the rotating frame", "rad/s"),
-    "frequency_hz": ("frequency in the rotating frame", "Hz"),
+    "frequency": ("frequency", "rad/s"),
+    "frequency_hz": ("frequency", "Hz"),
     "damping": ("damping ratio", "1"),
+    "log_decrement": ("logarithmic decrement", "1"),
     "growth": ("growth", "1/s"),
     "residual": ("backward error", "1"),
     "mesh_error": ("relative error that the mesh may cause", "1"),
     "error_bound": ("relative error that round-off may cause", "1"),
     "confidence": ("squared correlation with the speed before", "1"),
     "turning": ("wave with the spin (1) or against it (−1)", "1"),
-    "frequency_fixed": ("frequency in the fixed frame", "rad/s"),
+    "frequency_fixed": ("frequency, fixed frame", "rad/s"),
+    "frequency_fixed_2": ("frequency of the smaller wave, fixed frame", "rad/s"),
     "estimate": ("estimated relative change", "1"),
     "truth": ("relative change of the full models", "1"),
     "worst": ("largest estimated relative change", "1"),
@@ -115,6 +116,10 @@ def described(column: str) -> tuple[str, str]:
     if column.startswith("tip_") and column[4:].rstrip("123") in ("u", "alpha", "theta"):
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
+    if column.startswith("support_"):
+        _, number, which = column.split("_")
+        what, unit = ("force", "N") if which[0] == "f" else ("moment", "N·m")
+        return f"{what} on support {number}, {which[0]}{_SUB[which[1:]]}", unit
     if column.endswith("_phase"):
         return f"phase of {described(column.removesuffix('_phase'))[0]}", "rad"
     if column.startswith("shape_"):
@@ -127,9 +132,9 @@ def described(column: str) -> tuple[str, str]:
     return column, ""
 
 
-def label(column: str, shown: str = "") -> str:
-    """Return the axis label of a column, with its unit, or with the one that it is shown in."""
-    return f"{described(column)[0]} {shown_unit(column, shown)}".rstrip()
+def label(column: str, shown: str = "", frame: str = "") -> str:
+    """Return the axis label of a column, with its unit, or with the one that it is shown in, and with its frame."""
+    return f"{described(column)[0]}{f', {frame} frame' * bool(frame)} {shown_unit(column, shown)}".rstrip()
 
 
 def label_of(name: str) -> str:
@@ -224,14 +229,6 @@ class Columns:
         table = pandas.DataFrame(dict(self.values))
         return table.set_index(list(self.index)) if self.index and not table.empty else table
 
-    def write_hdf5(self, path: Path) -> Path:
-        """Write the columns as HDF5 datasets over their dimensions, with their units; return the path."""
-        with whole_hdf5(path) as file:
-            for name, (_, values) in self.variables().items():
-                data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
-                data.attrs["long_name"], data.attrs["units"] = described(name)
-        return path
-
 
 def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Dataset:
     """Return variables as labelled arrays, each with its `long_name` and `units` as far as they are known."""
@@ -241,6 +238,7 @@ def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Datas
     out = out.set_coords([name for name in COORDINATES if name in out])
     for name, array in out.variables.items():
         what, unit = described(str(name))
+        what += f", {attributes['frame']} frame" * (name in ("frequency", "frequency_hz") and "frame" in attributes)
         array.attrs |= {"long_name": what, "units": unit} if unit else {}
     return out
 

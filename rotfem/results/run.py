@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import Columns, ShortTable, Variables, by_unit, dataset, largest, named, number
+from rotfem.results.files import write_netcdf
 from rotfem.results.result import Array, OfTable, Result
 from rotfem.short import short_fields
 
@@ -26,7 +27,7 @@ class StationHistory:
         t: times, (n,), s.
         x: positions of the stations, (m,), m.
         values: quantity ↦ its values, (n, m), in axes of the turned section; unknowns in those of the frame.
-        format: of its file, "csv" or "hdf5".
+        format: of its file, "csv" or "netcdf".
     """
 
     t: Array
@@ -43,7 +44,7 @@ class StationHistory:
 
     @property
     def columns(self) -> Columns:
-        """Columns t, x and all quantities, a row for each time and station: as CSV, HDF5, pandas or labelled arrays."""
+        """Columns t, x and all quantities, a row for each time and station: as CSV, pandas or labelled arrays."""
         n, m = len(self.t), len(self.x)
         rows = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
         return Columns(rows | {name: values.ravel() for name, values in self.values.items()}, ("t", "x"))
@@ -64,13 +65,13 @@ class RunResult(Result):
     Attributes:
         summary: scene, versions, effects, timings, sizes, figures of merit; JSON-able.
         history: column ↦ values over time (`t` s, `psi` rad, `psi_dot` rad/s, `tip_u1` m, `tip_u2` m, `tip_alpha` rad,
-            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, …), in the frame; one row of a steady state.
+            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, `support_0_f2` N, …), in the frame; one row of
+            a steady state.
         shape: column ↦ values along the structure at the end (`x` m, of a plate `y` m too, `u1` m, …).
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
         stations: section forces, strains and unknowns at the stations of a beam; None where none are asked for.
         resultants: of a plate whose stress resultants are asked for, column ↦ values at its nodes at the end.
-        further: what else writes files into a folder.
     """
 
     history: dict[str, Array] = field(default_factory=dict)
@@ -79,7 +80,6 @@ class RunResult(Result):
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     stations: StationHistory | None = field(default=None, repr=False)
     resultants: dict[str, Array] = field(default_factory=dict)
-    further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
     t = OfTable("t", "Times of the history, shape (n,), s.")
 
@@ -115,11 +115,11 @@ class RunResult(Result):
         return super().texts() | ({} if stations is None else {"stations.csv": stations.columns.csv()})
 
     def large(self) -> list[Callable[[Path], object]]:
-        """Return what writes stations.h5 and files for ParaView, where these are asked for."""
+        """Return what writes stations.nc, where that is asked for."""
         stations = self.stations
-        if stations is None or stations.format != "hdf5":
-            return list(self.further)
-        return [lambda folder: stations.columns.write_hdf5(folder / "stations.h5"), *self.further]
+        if stations is None or stations.format != "netcdf":
+            return []
+        return [lambda folder: write_netcdf(folder / "stations.nc", stations.to_xarray())]
 
     def drawn(self) -> dict[str, str]:
         """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""
@@ -140,7 +140,11 @@ class RunResult(Result):
         ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
         if self.steady:
             scales = by_unit(ends)
-            return [ShortTable(("", "value"), [(named(name), number(ends[name], scales[name])) for name in ends])]
+            return [
+                ShortTable(
+                    (f"{self.frame} frame", "value"), [(named(name), number(ends[name], scales[name])) for name in ends]
+                )
+            ]
         tips = [name for name in ends if name.startswith("tip_u") and f"{name}_min" in found]
         scale = largest(found[f"{name}_{end}"] for name in tips for end in ("min", "max"))
         rows = []
@@ -148,7 +152,11 @@ class RunResult(Result):
             low, high, last = (number(found[f"{name}_{end}"], scale) for end in ("min", "max", "final"))
             when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
             rows.append((named(name), low, when[0], high, when[1], last))
-        return [ShortTable(("", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)] if rows else []
+        return (
+            [ShortTable((f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)]
+            if rows
+            else []
+        )
 
     def arrays(self) -> Variables:
         """Return the history over `t` (s), and shape and resultants over `node`, of a plate with its `triangles`."""
@@ -157,7 +165,7 @@ class RunResult(Result):
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit of a history: extremes of tip and root, with times, final values, Jacobi drift.
+    """Return the figures of merit: extremes of tip, root and supports, with times, final values, Jacobi drift.
 
     Extremes inside the history are those of the parabola through three neighbouring samples.
     """
@@ -165,7 +173,7 @@ def figures(history: dict[str, Array]) -> dict[str, float]:
     t = history["t"]
     if len(t) == 0:
         return out
-    for name in [n for n in history if n.startswith(("tip_", "root_"))]:
+    for name in [n for n in history if n.startswith(("tip_", "root_", "support_"))]:
         out[f"{name}_final"] = history[name][-1]
         if len(t) > 1:
             out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)

@@ -66,3 +66,19 @@ def test_stiff_strains_as_unknowns_with_viscosity(slenderness: float, viscosity:
     bounds = result.column("error_bound")[:2]
     assert np.all(bounds < 1e-3)
     assert np.all(errors < bounds + 150 * slenderness**2)
+
+
+@pytest.mark.estimated
+def test_a_stiff_shaft_on_soft_springs() -> None:
+    """It moves like a rigid body, ω² = 2k/m and 6k/(m + 12 m r²/L²), 1e-6 of the bending stiffness; both are known."""
+    k, length, outer, inner = 1.0, 0.3, 0.01504, 0.0035
+    section = {"shape": "tube", "outer_radius": outer, "inner_radius": inner, "E": 2.1e11, "nu": 0.3, "rho": 7850.0}
+    shaft = {"type": "spatial_beam", "length": length, "section": section, "root": {"driven": True}}
+    shaft["supports"] = [{"x": 0.0, "stiffness": k}, {"x": length, "stiffness": k}]
+    result = modes({"structure": shaft, "motion": {"type": "constant", "speed": 0.0, "axis": [1, 0, 0]}})
+    m = 7850.0 * np.pi * (outer**2 - inner**2) * length
+    rigid = np.sqrt([2 * k / m, 6 * k / (m * (1 + 3 * (outer**2 + inner**2) / length**2))])
+    np.testing.assert_allclose(result.frequencies[:4], np.repeat(rigid, 2), rtol=1e-6)
+    assert np.all(result.column("error_bound") < 1e-5)
+    assert result.summary["error"]["total"] < 1e-4
+    assert result.summary["warnings"] == []

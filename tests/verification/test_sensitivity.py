@@ -107,3 +107,29 @@ def test_taper_counts_as_a_factor() -> None:
         scaled = {"structure.section.EI": [[0.0, factor], [1.0, 0.5 * factor]]}
         pair.append(eigenvalues(scene.replace(scaled), 4.0)[0])
     assert row["dfrequency"] == pytest.approx((pair[0] - pair[1]).imag / (2 * h), rel=1e-6)
+
+
+def test_pairs_of_one_frequency() -> None:
+    """A round beam: 0.6131, 0.1883, 0.0647 of its mass along each axis (Young & Felgar 1949), dω/dEI = ω/2 and 0."""
+    section = {"EA": 1e8, "GA2": 32690421.7, "GA3": 32690421.7, "GJ": 0.77, "EI2": 1.0, "EI3": 1.0}
+    section |= {"mass_per_length": 1.0, "rotary_inertia2": 1e-8, "rotary_inertia3": 1e-8}
+    scene = {"structure": {"type": "spatial_beam", "length": 1.0, "section": section}, "modes": {"count": 6}}
+    found = modes(scene | {"motion": {"type": "constant", "speed": 0.0}}, sensitivities=True, participation=True)
+    masses = np.array([[row[f"effective_mass_{i}"] for i in (2, 3)] for row in found.rows])
+    expected = np.kron([[0.6131], [0.1883], [0.0647]], np.eye(2))
+    np.testing.assert_allclose(masses, expected, atol=1e-4)
+    slopes = {name: [r["dfrequency"] for r in found.sensitivities if r["parameter"] == name] for name in ("EI2", "EI3")}
+    halves = found.frequencies / 2
+    np.testing.assert_allclose(slopes["EI3"], halves * [1, 0, 1, 0, 1, 0], rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(slopes["EI2"], halves * [0, 1, 0, 1, 0, 1], rtol=1e-5, atol=1e-9)
+
+
+def test_pair_that_a_parameter_mixes() -> None:
+    """Sections turned by half a radian: the axes of the pair are not those of shapes; dω/dEI2 is still ω/2 and 0."""
+    section = {"EA": 1e8, "GA2": 3e7, "GA3": 3e7, "GJ": 0.77, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0}
+    section |= {"rotary_inertia2": 1e-8, "rotary_inertia3": 1e-8}
+    structure = {"type": "spatial_beam", "length": 1.0, "section": section, "pretwist": [[0.0, 0.5], [1.0, 0.5]]}
+    scene = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 2}}
+    found = modes(scene, sensitivities=True)
+    slopes = [row["dfrequency"] for row in found.sensitivities if row["parameter"] == "EI2"]
+    np.testing.assert_allclose(sorted(slopes), [0.0, found.frequencies[0] / 2], rtol=1e-5, atol=1e-5)

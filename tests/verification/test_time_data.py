@@ -24,7 +24,7 @@ HUB = {"type": "torque", "hub_inertia": 1.0}
 DATA: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "speeds": (SPEEDS, {}),
     "speeds, inertial frame": (SPEEDS, {"model": {"frame": "inertial"}}),
-    "load": (SPIN, {"loads": {"distributed": {"table": RAMPS}}}),
+    "load": (SPIN, {"loads": {"distributed": {"over_time": RAMPS}}}),
     "base acceleration": (SPIN | {"base_acceleration": RAMPS}, {}),
     "torque": (HUB | {"table": [[t, f] for t, _, f in RAMPS]}, {}),
     "pulses": (HUB | {"pulses": [[0.1234, 0.3517, 0.5], [0.6, 0.9, -0.3]]}, {}),
@@ -150,6 +150,16 @@ def test_dense_noise_is_averaged() -> None:
         answers.append(np.interp(np.arange(0.0, 0.4, 0.02), result.history["t"], result.history["tip_u2"]))
         assert result.summary["factorisations"] < 4 * result.summary["steps"]
     assert np.abs(answers[0] - answers[1]).max() < 5e-3 * np.abs(answers[1]).max()
+
+
+def test_a_table_of_what_steps_resolve_is_as_cheap_as_its_function() -> None:
+    """401 rows of 20 sin 3t, 390 steps: the same factorisations and the same history."""
+    t = np.linspace(0.0, 4.0, 401)
+    rows = [[float(s), 0.0, float(20.0 * np.sin(3.0 * s))] for s in t]
+    given = (rows, lambda s: [0.0, float(np.interp(s, t, [row[2] for row in rows]))])
+    table, function = (krb(SPIN, 4.0 / 390, 4.0, loads={"tip_force": load}) for load in given)
+    assert table.summary["factorisations"] == function.summary["factorisations"]
+    np.testing.assert_allclose(table.history["tip_u2"], function.history["tip_u2"], rtol=0, atol=1e-9)
 
 
 def test_a_blow_of_any_width_has_its_impulse_in_adaptive_steps() -> None:
