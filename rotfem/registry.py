@@ -82,6 +82,7 @@ blade_formats: Registry[Any] = Registry(
     "rotfem.scene.blades.bmodes",
     "rotfem.scene.blades.hawc2",
     "rotfem.scene.blades.windio",
+    "rotfem.scene.rotors.ross",
 )
 motion_laws: Registry[Any] = Registry("type of motion", "rotfem.scene.motion")
 damping_models: Registry[Any] = Registry("damping model")

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import pytest
 
-from rotfem.commands import console
 from rotfem.commands.cli import app
 from tests import blade_decks
 from tests.launch import environment
@@ -64,7 +63,7 @@ VERBS = {
     "campbell": ("campbell", "blade.toml", "--speeds", "0:60:4rpm"),
     "response": ("response", "arm.toml", "--from", "0.2Hz", "--to", "1Hz", "--number", "20"),
     "check": ("check", "blade.toml"),
-    "explain": ("explain", "blade.toml", "--check"),
+    "explain": ("explain", "blade.toml"),
     "cost": ("cost", "blade.toml", "--quick", "--budget", "60s", "--accuracy", "0.1"),
     "sweep": ("sweep", "blade.toml", "--set", "motion.speed=0:20:2rpm", "--", "modes"),
     "import": ("import", "Blade.st", "-o", "imported.toml"),
@@ -217,14 +216,3 @@ def test_compilation_is_said_with_a_bar_that_moves(alone: Terminal, tmp_path: Pa
     assert frames[-1][0] - frames[0][0] > 0.3 * (whole - frames[0][0]), "it is seen for as long as that takes"
     warm = alone("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
     assert "compiling" not in warm.text
-
-
-def test_lines_in_the_place_of_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Where there is no terminal: after ten seconds, then at doubled times, by the pace so far."""
-    now = [0.0]
-    monkeypatch.setattr(console, "monotonic", lambda: now[0])
-    progress = console.ProgressBar("arm", True)
-    for now[0], share in ((8.0, 0.1), (10.0, 0.2), (15.0, 0.3), (30.0, 0.6), (60.0, 1.0)):
-        progress(share)
-    lines = ["arm: 20 % after 10 s, about 40 s to go", "arm: 60 % after 30 s, about 20 s to go"]
-    assert capsys.readouterr().err.splitlines() == lines
