@@ -183,7 +183,9 @@ class March:
         end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
-        knots = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        signals = self.system.signals
+        found = knots_of(signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        knots = np.unique(np.concatenate([found, *(s.bent for s in signals)]))
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 

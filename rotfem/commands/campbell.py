@@ -32,7 +32,7 @@ from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
-from rotfem.results import CampbellResult
+from rotfem.results.campbell import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.commands.fields import modes_writer, surface_of
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.structures.mode_names import Wave, distinct
 from rotfem.units import speed_text
 

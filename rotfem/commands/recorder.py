@@ -153,8 +153,7 @@ class ResultantRows:
     """Takes the states of the rows of a history of a plate, its hub held, and keeps named resultants.
 
     Attributes:
-        frames: values (nodes, names) at the times of the fields' snapshots, which the recorder adds.
-        last: at the last row.
+        last: values (nodes, names) at the last row.
         largest: largest equivalent stress (Pa) so far, where, and when: value, x, y (m), t (s).
     """
 
@@ -164,7 +163,6 @@ class ResultantRows:
         self._nodes = system.structure.nodes(system.zeros())[0]
         self._columns = [self._resultants.names.index(name) for name in names]
         self._stress = self._resultants.names.index(STRESS)
-        self.frames = Snapshots()
         self.last: Array | None = None
         self.largest: tuple[float, ...] = ()
 
@@ -282,9 +280,7 @@ class Recorder:
         self.history.append(row)
         self._last = state
         if self.snapshots is not None:
-            self.snapshots.add(state.t, state.q)
-            if self.resultants is not None and self.resultants.last is not None:
-                self.resultants.frames.add(state.t, self.resultants.last)
+            self.snapshots.add(state.t, state.q, None if self.resultants is None else self.resultants.last)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""
@@ -298,8 +294,8 @@ class Recorder:
         if self.stations is not None:
             out.stations = self.stations.result()
         if self.snapshots is not None and self.snapshots.kept:
-            more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
-            out.fields = fields_writer(self.system, self.snapshots.kept, more)
+            names = () if self.resultants is None else self.resultants.names
+            out.fields = fields_writer(self.system, self.snapshots, names)
         if self.resultants is not None:
             out.resultants = self.resultants.columns()
         return out

@@ -54,7 +54,6 @@ REMEMBERED = {
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
-    "record.resultants.frames": ("kept", "_every", "_count"),
     "march": ("substeps", "rejected"),
     "march.last": ("long", "confirmed"),
     "march.newton": ("iterations", "roundoff", "_kappa", "_longest"),

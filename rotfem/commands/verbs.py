@@ -359,9 +359,6 @@ def check(session: Session) -> None:
 @verb(computes=False)
 def explain(
     session: Session,
-    check: Annotated[
-        bool, typer.Option("--check", help="run the full models too: true changes next to the estimates")
-    ] = False,
     accuracy: Annotated[
         float | None, typer.Option("--accuracy", help="that the model of --write is for, 1e-2 by default")
     ] = None,
@@ -379,7 +376,7 @@ def explain(
     if write is not None:
         session.check_writable("--write", write, session.scene.inputs)
     scene = session.scene if accuracy is None else session.scene.replace({"accuracy": accuracy})
-    result = estimate(scene, check=check, comm=session.comm, progress=session.bar)
+    result = estimate(scene, comm=session.comm, progress=session.bar)
     session.finish(result)
     if write is not None and session.first:
         within = result.summary["needed"]["accuracy"]

@@ -56,7 +56,7 @@ class Problem:
         mesh: elements, degree and integration.
         theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
-        loads: gravity and applied loads, as sums.
+        loads: gravity and applied loads, as sums; may be given as [loads] of a scene (`rotfem.Loads` of a script).
         frame: "rotating"; "fixed", the frame of a round shaft that spins about its own axis; or "inertial" (translates
             with the hub, does not rotate). "auto" becomes "fixed" for such a shaft, else "rotating".
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
@@ -80,6 +80,10 @@ class Problem:
     __repr__ = short_fields
 
     def __post_init__(self) -> None:
+        given: Any = self.loads
+        if not isinstance(given, Loads):
+            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
+            object.__setattr__(self, "loads", made)
         if isinstance(self.theory, str):
             if self.theory not in Theory.registry:
                 raise InputError("model.theory", self.theory, f"allowed: {', '.join(Theory.registry.names)}")

@@ -264,7 +264,7 @@ class Time(WithParameters):
 
     def _check_steps(self) -> None:
         if (self.step is None) == (self.tolerance is None):
-            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
+            reason = "give step (fixed steps, s) or tolerance (adaptive steps), or neither, and the scene an accuracy"
             raise problem("step", self.step, reason)
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")

@@ -19,6 +19,7 @@ from tests.blade_scenes import RIGID, STIFF
 from tests.fuzz.trying import VALIDATION, check_finite, check_message, within
 
 LENGTH = {"length": decks.LENGTH}
+REFERENCE = Path(__file__).parent.parent / "reference"
 
 #: Name of a file ↦ (text, keys of the section beside it, keys of the structure).
 SEEDS: dict[str, tuple[str, Mapping[str, Any], Mapping[str, Any]]] = {
@@ -33,6 +34,8 @@ SEEDS: dict[str, tuple[str, Mapping[str, Any], Mapping[str, Any]]] = {
     "main.htc": (mains.hawc2_htc(), {"body": "blade1"}, {}),
     "one.yaml": (decks.windio(), {}, {}),
     "two.yaml": (decks.windio_2(), {}, {}),
+    "rotor.toml": ((REFERENCE / "ross_rotor_example.toml").read_text(), {}, {}),
+    "rotor.json": ((REFERENCE / "ross_every_element.json").read_text(), {}, {}),
 }
 NUMBER = re.compile(r"-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?")
 NUMBERS = ["0", "-1", "1", "3", "99", "1e9", "1e300", "-1e308", "1e-320", "1e400", "9" * 30, "nan", "inf", ".", "1,5"]
