@@ -45,7 +45,7 @@ def read_text(path: Path) -> str:
         raise Unreadable(f"cannot be read: byte {error.start} is not UTF-8 text") from None
 
 
-_KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
+_KEY = re.compile(r"[A-Za-z0-9_-]+(\.([A-Za-z0-9_-]+|\*))*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -78,8 +78,8 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 def set_keys(file: str, data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return a copy of nested tables with dotted keys set, one after the other, or removed if the value is None.
 
-    Missing tables on the way are created; a number names an entry of a list, from 0. Raise a SceneError of the file
-    where a part of a path is neither a table nor an entry of a list.
+    Missing tables on the way are created; a number names an entry of a list, from 0, and * all of them. Raise a
+    SceneError of the file where a part of a path is neither a table nor an entry of a list.
     """
     for key, value in changes:
         parts = key.split(".")
@@ -92,6 +92,8 @@ def _set(file: str, given: Any, key: str, parts: Sequence[str], depth: int, valu
     if depth == len(parts):
         return value
     part: Any = parts[depth]
+    if isinstance(given, list | tuple) and part == "*":
+        return [_set(file, entry, key, parts, depth + 1, value) for entry in given]
     if isinstance(given, list | tuple) and part.isdigit() and int(part) < len(given):
         out: Any = list(given)
         out[int(part)] = _set(file, out[int(part)], key, parts, depth + 1, value)
