@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers, shown_unit
 from rotfem.results.files import json_text
 from rotfem.results.result import Array, OfTable, Rows
 
@@ -21,9 +21,9 @@ class CriticalSpeed:
         kind: "forward" of a rotor's whirl that an unbalance excites; "backward" of whirl against the spin at its speed,
             or a wave of a disk that stands still in the fixed frame; "per_rev" of any other one.
         order: 1 of whirl, nodal diameters of a disk's wave, k of "per_rev".
-        branch: number of the branch, from 1 on.
-        per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
-        frequency: of the branch there, in the rotating frame, kΩ, rad/s.
+        branch: number of the branch, from 1 on; 0 of a whirl that is none of the branches.
+        per_rev: k, the frequency in the frame of the diagram over the speed; 0 of forward whirl in the rotating one.
+        frequency: of the branch there, in the frame of the diagram, kΩ, rad/s.
         label: of the branch.
     """
 
@@ -62,14 +62,14 @@ class CampbellResult(Rows):
             `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
             asked for); of a shaft or a disk `turning` (1 for a wave that runs with the spin in the rotor, −1 against
             it, 0 for a standing one), `whirl` ("forward", "backward" or "standing") and `frequency_fixed` (rad/s, in
-            the fixed frame).
+            the fixed frame). A shaft has `log_decrement` δ = −2π Re λ/|Im λ|, None of what does not vibrate; in the
+            rotating frame it has `frequency_fixed_2` of its smaller wave, too: both are |ω ± Ω|.
     """
 
     index = ("speed", "label")
     frequencies = OfTable(
         "frequency",
-        "Frequencies in the rotating frame, (speeds, branches), rad/s; NaN where a branch is lost. With supports that "
-        "differ by direction they are those in the fixed frame.",
+        "Frequencies in the `frame`, (speeds, branches), rad/s; NaN where a branch is lost.",
     )
     damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (speeds, branches); NaN where a branch is lost.")
     growth = OfTable("growth", "Growth Re λ, (speeds, branches), 1/s; NaN where a branch is lost.")
@@ -110,19 +110,28 @@ class CampbellResult(Rows):
             out[label] = {name: mine.array(name).astype(np.float64) for name in mine.numbers}
         return out
 
+    def data(self) -> dict[str, Columns]:
+        """Return the branches, and critical speeds over a key where these are asked for."""
+        rows = self.summary.get("map", {}).get("rows")
+        return super().data() | ({"critical_map": Columns.of_rows(rows)} if rows else {})
+
     def texts(self) -> dict[str, str]:
         """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
             **super().texts(),
-            "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
+            "campbell.json": json_text(
+                {"frame": self.frame, **{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}
+            ),
         }
 
     def drawn(self) -> dict[str, str]:
         """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
-        both = self.summary.get("frame") != "fixed" and "whirl" in self.rows[0]
+        both = self.frame != "fixed" and "whirl" in self.rows[0]
         fixed = {"campbell_fixed.png": "results.plots_campbell:fixed_figure"}
-        return {"campbell.png": "results.plots_campbell:campbell_figure", **(fixed if both else {})}
+        over = {"critical_map.png": "results.plots_campbell:map_figure"}
+        more = (fixed if both else {}) | (over if self.summary.get("map", {}).get("rows") else {})
+        return {"campbell.png": "results.plots_campbell:campbell_figure", **more}
 
     def tables(self) -> list[ShortTable]:
         """Return the branches, with frequencies at the first and the last speed, and the critical speeds."""
@@ -141,7 +150,7 @@ class CampbellResult(Rows):
             [f"{b['confidence']:.3f}" for b in branches],
         ]
         first, last = (f"{units.frequency} at {number(float(units.speeds(x)))} {units.speed}" for x in ends)
-        head = ("branch", "name", first, last, "MAC (–)")
+        head = ("branch", "name", f"{self.frame} frame: {first}", last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
             what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"
@@ -149,4 +158,12 @@ class CampbellResult(Rows):
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:
             out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
+        if over := self.summary.get("map"):
+            labels = list(dict.fromkeys(row["label"] for row in over["rows"]))[:4]
+            found = {(row["value"], row["label"]): f"{units.speeds(row['speed']):.6g}" for row in over["rows"]}
+            heads = [f"{label.removesuffix(' whirl')} ({units.speed})" for label in labels]
+            values = dict.fromkeys(row["value"] for row in over["rows"])
+            rows = [(f"{value:.4g}", *(found.get((value, label), "–") for label in labels)) for value in values]
+            key = over["key"].rpartition(".")[2]
+            out.append(ShortTable((f"{key} {shown_unit(key)}".rstrip(), *heads), rows))
         return out

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
-from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
@@ -46,7 +45,7 @@ def read_text(path: Path) -> str:
         raise Unreadable(f"cannot be read: byte {error.start} is not UTF-8 text") from None
 
 
-_KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
+_KEY = re.compile(r"[A-Za-z0-9_-]+(\.([A-Za-z0-9_-]+|\*))*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -79,8 +78,8 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 def set_keys(file: str, data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return a copy of nested tables with dotted keys set, one after the other, or removed if the value is None.
 
-    Missing tables on the way are created; a number names an entry of a list, from 0. Raise a SceneError of the file
-    where a part of a path is neither a table nor an entry of a list.
+    Missing tables on the way are created; a number names an entry of a list, from 0, and * all of them. Raise a
+    SceneError of the file where a part of a path is neither a table nor an entry of a list.
     """
     for key, value in changes:
         parts = key.split(".")
@@ -93,6 +92,8 @@ def _set(file: str, given: Any, key: str, parts: Sequence[str], depth: int, valu
     if depth == len(parts):
         return value
     part: Any = parts[depth]
+    if isinstance(given, list | tuple) and part == "*":
+        return [_set(file, entry, key, parts, depth + 1, value) for entry in given]
     if isinstance(given, list | tuple) and part.isdigit() and int(part) < len(given):
         out: Any = list(given)
         out[int(part)] = _set(file, out[int(part)], key, parts, depth + 1, value)
@@ -128,13 +129,9 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not isinstance(value, str | Path) or not str(value):
         raise problem("", value, "must be the path of a file")
     directory = Path((info.context or {}).get("directory", "."))
-    try:
-        path = (directory / value).resolve()
-        found, there = path.is_file(), path.exists()
-    except (OSError, ValueError) as error:
-        raise problem("", str(value), f"must be the path of a file: {error}") from None
-    if not found:
-        what = "is no regular file" if there else "file not found"
+    path = (directory / value).resolve()
+    if not path.is_file():
+        what = "is no regular file" if path.exists() else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
     READ.append(path)
     return path
@@ -159,48 +156,29 @@ FROM_FILE = BeforeValidator(read_rows)
 def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
     """Return the names of the columns, if the file has any, and the rows of a table of finite numbers in a CSV file.
 
-    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number. Raise if there is
-    anything else, or nothing, naming line and column.
+    `#` starts a comment. The first row is a header if none of its cells is a number.
     """
-
-    def refused(reason: str) -> PydanticCustomError:
-        return problem("", str(path), reason)
-
     try:
-        text = read_text(path)
+        lines = read_text(path).splitlines()
     except Unreadable as error:
-        raise refused(str(error)) from None
-    header, rows, width, top = list[str](), list[tuple[float, ...]](), 0, 0  # columns of the first row, and its line
-    for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
-        if not (cells := _cells(line)):
+        raise problem("", str(path), str(error)) from None
+    header, rows = list[str](), list[tuple[float, ...]]()
+    for number, line in enumerate(lines, start=1):
+        if not (content := line.split("#", 1)[0].strip()):
             continue
-        values = [number_in(cell) for cell in cells]
-        if not top:
-            width, top = len(cells), number
-            if any(cells) and all(value is None for value in values):
-                header = cells
-                continue
-        for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
-            if value is None or not math.isfinite(value):
-                reason = f"line {number}, column {column}: {shown_cell(cell)} must be a finite number"
-                raise refused(f"{reason} (only the first row may be a header, one without any number)")
-        if len(cells) != width:
-            raise refused(f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
-        rows.append(tuple(value for value in values if value is not None))
+        cells = [cell.strip() for cell in content.split(",")]
+        values = tuple(math.nan if (value := number_in(cell)) is None else value for cell in cells)
+        width = len(header or (*rows, values)[0])
+        if not header and not rows and all(number_in(cell) is None for cell in cells):
+            header = cells
+        elif not all(map(math.isfinite, values)) or len(values) != width:
+            why = f"line {number} must be {width} finite numbers; only the first row may be a header, without any"
+            raise problem("", str(path), why)
+        else:
+            rows.append(values)
     if not rows:
-        raise refused("has no row of numbers")
+        raise problem("", str(path), "has no row of numbers")
     return header, rows
-
-
-def _cells(line: str) -> list[str]:
-    """Return the cells of a line, none of one that is empty but for a comment."""
-    content = line.split("#", 1)[0].strip()
-    return [cell.strip() for cell in content.split(",")] if content else []
-
-
-def shown_cell(cell: str) -> str:
-    """Return a cell as a message shows it: a file may be anything that can be read here, and so a secret."""
-    return f'"{cell}"' if len(cell) <= 12 and cell.isprintable() else f"a text of {len(cell)} characters"
 
 
 def number_in(cell: str) -> float | None:

