@@ -20,7 +20,7 @@ from rotfem.accuracy.modes import Modes, modal_answers, modal_errors
 from rotfem.analysis.modal import ModalAnalysis, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed, stability_of_pencil
-from rotfem.commands.advice import advise, frozen_inputs
+from rotfem.commands.advice import advise, beyond, frozen_inputs
 from rotfem.commands.answers import check_of, clock_of, to_accuracy
 from rotfem.commands.mode_tables import doubtful, mode_tables
 from rotfem.commands.problem import Problem
@@ -137,7 +137,8 @@ def _modes(
     check_rows(found.rows)
     spinning = found.spinning
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    warnings = [*frozen_inputs(problem), *analysis.notes, *found.warnings]
+    held = beyond(problem, [speed], [row["frequency"] for row in found.rows])
+    warnings = [*frozen_inputs(problem), *held, *analysis.notes, *found.warnings]
     # An instability that grows by more than those of the modes that are asked for is none of them.
     least = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
     if stability.stable is None or stability.held_by_spin or stability.growth > max(least, 0.0):

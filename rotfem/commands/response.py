@@ -28,7 +28,7 @@ from rotfem.analysis.frequency_response import (
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.advice import frozen_in_frame
+from rotfem.commands.advice import beyond, frozen_in_frame
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
@@ -226,6 +226,7 @@ def result_of(
         *frozen_in_frame(analysis.problem),
         *analysis.notes,
         *advice(analysis, spinning.speed),
+        *beyond(analysis.problem, [spinning.speed]),
         *instabilities(modes),
         *doubtful(modes),
     ]
