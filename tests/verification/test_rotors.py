@@ -179,6 +179,16 @@ def test_damped_bearings(theory: str, speed: float) -> None:
         np.testing.assert_allclose([row["frequency"], row["growth"]], [expected.imag, expected.real], rtol=5e-5)
 
 
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_damping_by_mode_of_a_shaft_is_external(theory: str) -> None:
+    """The modes at rest on their bearings have the ratio, and a Jeffcott rotor keeps it at any speed: 1e-4."""
+    for speed in (0.0, 200.0):
+        motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+        scene = shaft_on_bearings(2e4, motion=motion, model={"theory": theory})
+        scene["structure"]["damping"] = {"modal": 0.02}
+        np.testing.assert_allclose([row["damping"] for row in rotfem.modes(scene).rows], 0.02, rtol=1e-4)
+
+
 def test_cross_coupling_makes_forward_whirl_grow() -> None:
     """[[k, q], [−q, k]]: m/2 λ² + K z with K = k_s(k − iq)/(k_s + k − iq) in z = y + iz; the pair is λ = ±√(−2K/m)."""
     k, q, k_s, half = 2e4, 500.0, 24.0 * EI, 5.0
