@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
-from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, ShownUnits, label
-from rotfem.results.plots import LEFT, dress
+from rotfem.results.plots import BELOW, LEFT, dress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,11 +19,8 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Height of a name at the end of a line, inch.
-NAME_HEIGHT = 0.16
-
-#: Width of the diagram, inch.
-WIDTH = 9.0
+#: Inches: width of the diagram, of the legend beside it, and heights of the panels and of a line of the legend.
+WIDTH, BESIDE, HEIGHTS, LINE = 10.0, 3.2, (4.8, 1.6), 0.185
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class Branch:
 def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
-    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it. With
+    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named in the legend. With
     `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds.
     """
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
@@ -67,52 +63,47 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
-    heights: list[float] = [max(4.8, (len(shown) + len(orders) + 1) * NAME_HEIGHT), 1.6][: 1 + damped]
-    above = [b for b in branches if b not in shown]
-    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
-    names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
-    figure = Figure(figsize=(WIDTH, sum(heights)))
-    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False)[:, 0]
+    figure = Figure()
+    panels = figure.subplots(1 + damped, 1, sharex=True, squeeze=False)[:, 0]
     axis = panels[0]
     seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
     captions = [label(seen, units.frequency), "damping ratio (%)"]
     for panel, caption in zip(panels, captions, strict=False):
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
-        marks(panel, result, units, last)
-    for b in shown:
-        axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
+    for b in sorted(shown, key=lambda b: -float(b.frequency[-1])):  # as the legend names them
+        axis.plot(b.speed, b.frequency, lw=1.6, label=b.name, **b.style)
         axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
         for i in np.flatnonzero(b.doubtful):
             axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
         if damped:
             there = np.isfinite(b.damping)
             panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
-    rays = [(f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
-    for _, slope in rays:
-        reach = top / slope
+    for b in (b for b in branches if b not in shown):
+        axis.plot([], [], " ", label=f"above: {b.name}, {b.frequency[-1]:.3g} {units.frequency}")
+    for panel in panels:
+        marks(panel, result, units, last)
+    for k in orders:
+        reach = top / (k * rise)
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
-        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
+        axis.plot(x, k * rise * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
+        at = {"textcoords": "offset points", "fontsize": 8, "color": "0.4", "annotation_clip": False}
+        axis.annotate(f"{k}Ω" if k > 1 else "Ω", (x[2], k * rise * x[2]), xytext=(2, 2), **at)
     crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
-    name_lines(axis, shown, rays, heights[0])
-    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": "0.4", "va": "bottom"}
-    axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
     name_styles(axis, shown)
     entries = axis.get_legend_handles_labels()
-    letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
-    right = 0.35 + max(0.068 * letters[0], 0.06 * letters[1])
-    over = 0.4 + max(0.12 * len(names), 0.2 * any(slope * last > top for _, slope in rays))
-    below = 0.65 + 0.2 * -(-len(entries[0]) // 3)
-    height = over + sum(heights) + 0.2 * damped + below
-    figure.set_figheight(height)
-    for panel, own, under in zip(panels, heights, [below + sum(heights[1:]) + 0.2 * damped, below], strict=False):
-        panel.set_position((LEFT / WIDTH, under / height, 1.0 - (LEFT + right) / WIDTH, own / height))
+    below, height = BELOW, max(BELOW + sum(HEIGHTS[: 1 + damped]) + 0.6, LINE * len(entries[0]) + 0.8)
+    figure.set_size_inches(WIDTH, height)
+    for panel, own in zip(panels[::-1], HEIGHTS[: 1 + damped][::-1], strict=True):
+        panel.set_position((LEFT / WIDTH, below / height, 1.0 - (LEFT + BESIDE) / WIDTH, own / height))
+        below += own + 0.2
     figure.suptitle(result.title, fontsize=11, y=1.0 - 0.08 / height, va="top")
     if entries[0]:
-        figure.legend(*entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
+        place = (1.0 - (BESIDE - 0.2) / WIDTH, 1.0 - 0.45 / height)
+        figure.legend(*entries, loc="upper left", bbox_to_anchor=place, fontsize=8, frameon=False)
     return figure
 
 
@@ -205,47 +196,11 @@ def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool
 
 
 def name_styles(axis: Axes, branches: list[Branch]) -> None:
-    """Name dashes, crosses and broad lines in the legend, as far as there are some."""
+    """Name crosses and broad lines in the legend, as far as there are some."""
     kinds: tuple[tuple[bool, str, dict[str, Any]], ...] = (
-        (any(b.style["ls"] == "--" for b in branches), "backward", {"color": "0.3", "ls": "--"}),
         (any(np.any(b.unstable) for b in branches), "grows", {"color": "C3", "ls": "", "marker": "x"}),
         (any(np.any(b.doubtful) for b in branches), "ambiguous", {"color": "0.6", "lw": 7, "alpha": 0.5}),
     )
     for there, name, style in kinds:
         if there:
             axis.plot([], [], label=name, **style)
-
-
-def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], height: float) -> None:
-    """Write the names of the branches at their ends, and of the lines kΩ (rays, with slopes) where they leave the axis.
-
-    The axis is of a height in inch.
-    """
-    last, top = axis.get_xlim()[1], axis.get_ylim()[1]
-    text: dict[str, Any] = {"annotation_clip": False, "fontsize": 8}
-    ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
-    ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
-    places = spread([y for _, _, y, _ in ends], NAME_HEIGHT / height * top, (0.0, top))
-    for (name, x, y, color), place in zip(ends, places, strict=True):
-        line = {"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0}
-        beside: dict[str, Any] = {"xytext": (1.02, place), "textcoords": axis.get_yaxis_transform(), "va": "center"}
-        axis.annotate(name, (x, y), color=color, arrowprops=line, **beside, **text)
-    leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
-    at = spread([x for _, x in leaving], 0.42 / (WIDTH - 3.0) * last, (0.0, last))  # a name is 0.42 inch wide
-    for (name, _), place in zip(leaving, at, strict=True):
-        axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
-
-
-def spread(values: list[float], gap: float, limits: tuple[float, float]) -> list[float]:
-    """Return the values closest to those given that are `gap` apart and within limits, so that labels can be read.
-
-    By least squares: with y_i = z_i + i gap in the order of the values, z is their isotonic regression.
-    """
-    if not values:
-        return []
-    order = np.argsort(values, kind="stable")
-    steps = min(gap, (limits[1] - limits[0]) / max(len(values) - 1, 1)) * np.arange(len(values))
-    z = isotonic_regression(np.asarray(values)[order] - steps).x
-    out = np.empty(len(values))
-    out[order] = np.clip(z, limits[0], limits[1] - steps[-1]) + steps
-    return [float(y) for y in out]
