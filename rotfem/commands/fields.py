@@ -1,6 +1,6 @@
 """Fields over a structure: its properties along the span, and what is written for ParaView, in XDMF.
 
-That is the moving structure, its modes, section forces and stress resultants.
+That is the moving structure, its modes and stress resultants.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy.typing as npt
 from rotfem.equations.system import System
 from rotfem.results.files import whole_hdf5, write_text
 from rotfem.results.modes import ModesResult
-from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import HALF_WIDTH, Surface
 from rotfem.scene.values import evaluate
 
@@ -78,24 +77,6 @@ def moved(structure: Any, values: Array) -> Array:
         if name in ("u1", "u2", "u3"):
             out[..., int(name[1]) - 1] = values[..., i]
     return out
-
-
-def stations_writer(system: System, stations: StationHistory) -> Callable[[Path], list[Path]]:
-    """Return what writes stations.xdmf: displacements, section forces and strains on the line through the stations."""
-    structure, every = system.structure, 1 + (len(stations.t) - 1) // MOST_STATES
-    points = structure.places({"x": stations.x})
-    others = [name for name in stations.values if name not in structure.components]
-
-    def frame(i: int) -> dict[str, Array]:
-        unknowns = np.stack([stations[name][i] for name in structure.components], axis=-1)
-        return {"displacement": moved(structure, unknowns), **{name: stations[name][i] for name in others}}
-
-    def write(folder: Path) -> list[Path]:
-        chosen = sorted({*range(0, len(stations.t), every), len(stations.t) - 1} - {-1})
-        frames = [(float(stations.t[i]), frame(i)) for i in chosen]
-        return write_xdmf(folder / "stations_line.xdmf", points, chain(len(points)), frames)
-
-    return write
 
 
 # --- along the span ---------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from rotfem.analysis.equilibrium import LargestState
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
-from rotfem.commands.fields import Snapshots, fields_writer, stations_writer
+from rotfem.commands.fields import Snapshots, fields_writer
 from rotfem.commands.problem import hub_values
 from rotfem.equations.stations import PlateResultants, Stations
 from rotfem.equations.system import System
@@ -282,8 +282,6 @@ class Recorder:
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()
-            if self.snapshots is not None and len(out.stations.t):  # a run may fail before its first record
-                out.further.append(stations_writer(self.system, out.stations))
         if self.snapshots is not None and self.snapshots.kept:
             more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
             out.fields = fields_writer(self.system, self.snapshots.kept, more)

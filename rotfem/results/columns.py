@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
-from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.registry import outputs
-from rotfem.results.files import csv_text, whole_hdf5
+from rotfem.results.files import csv_text
 from rotfem.units import quantity
 
 if TYPE_CHECKING:
@@ -227,14 +226,6 @@ class Columns:
 
         table = pandas.DataFrame(dict(self.values))
         return table.set_index(list(self.index)) if self.index and not table.empty else table
-
-    def write_hdf5(self, path: Path) -> Path:
-        """Write the columns as HDF5 datasets over their dimensions, with their units; return the path."""
-        with whole_hdf5(path) as file:
-            for name, (_, values) in self.variables().items():
-                data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
-                data.attrs["long_name"], data.attrs["units"] = described(name)
-        return path
 
 
 def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Dataset:

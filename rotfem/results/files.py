@@ -11,13 +11,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from pydantic_core import to_jsonable_python
 
 from rotfem.errors import OutputError
+
+if TYPE_CHECKING:
+    import xarray
 
 Array = npt.NDArray[np.float64]
 
@@ -136,6 +139,13 @@ def write_whole(path: Path, content: bytes | memoryview) -> Path:
         except BaseException:
             os.unlink(name)
             raise
+    return path
+
+
+def write_netcdf(path: Path, data: xarray.Dataset) -> Path:
+    """Write labelled arrays, real ones, as NetCDF; return the path."""
+    with writing(path):
+        data.to_netcdf(path, engine="scipy")
     return path
 
 

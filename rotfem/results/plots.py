@@ -102,52 +102,20 @@ def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
 
 
 def stacked(
-    x: str,
-    at: Array,
-    columns: Mapping[str, Array],
-    title: str,
-    units: Mapping[str, str] | None = None,
-    ranges: Mapping[str, Array] | None = None,
+    x: str, at: Array, columns: Mapping[str, Array], title: str, units: Mapping[str, str] | None = None
 ) -> Figure:
-    """Return one panel a column over the abscissa x, with marks where it is a position.
+    """Return one panel a column, or columns (n, m), over the abscissa x, with marks where it is a position.
 
-    `units` has those that are not the usual ones, `ranges` the lowest and highest values (2, n), drawn as areas.
+    `units` has those that are not the usual ones.
     """
-    units, ranges = units or {}, ranges or {}
-    shown, title = not_zero({**columns, **ranges}, title)
+    units, (shown, title) = units or {}, not_zero(columns, title)
     figure, panels = panels_over(label(x), len(shown), title)
     for panel, name in zip(panels, shown, strict=True):
-        said = described(name)[0]
-        if x == "t":
-            said += history_line(panel, at, columns[name])
-        else:
-            panel.plot(at, columns[name], lw=1.2, marker=".", ms=4)
-        if name in ranges:
-            panel.fill_between(at, *ranges[name], alpha=0.2, lw=0.0)
-        caption(panel, said)
+        panel.plot(at, columns[name], lw=1.0 if x == "t" else 1.2, marker="" if x == "t" else ".", ms=4)
+        caption(panel, described(name)[0])
         panel.set_ylabel(shown_unit(name, units.get(name, "")))
         panel.set_xlim(at[0], at[-1])
     return figure
-
-
-def periods(y: Array) -> int:
-    """Return how often a history is largest between smaller values, by more than 1 % of its range."""
-    levels = np.rint(100.0 * (y - np.min(y)) / (np.ptp(y) or 1.0))
-    moves = np.diff(levels)
-    ups = moves[moves != 0.0] > 0.0
-    return int(np.count_nonzero(ups[:-1] & ~ups[1:]))
-
-
-def history_line(axis: Axes, t: Array, y: Array) -> str:
-    """Draw a history, one of more than 500 periods as range and mean of 250 stretches; return what to say of it."""
-    if (count := periods(y)) <= 500:
-        axis.plot(t, y, lw=1.0)
-        return ""
-    times, parts = np.array_split(t, 250), np.array_split(y, 250)
-    middle, mean = np.array([part.mean() for part in times]), np.array([part.mean() for part in parts])
-    axis.fill_between(middle, [part.min() for part in parts], [part.max() for part in parts], alpha=0.35, lw=0.0)
-    axis.plot(middle, mean, lw=1.2)
-    return f", range and mean of {count} periods"
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -180,15 +148,14 @@ def shape_figure(result: RunResult) -> Figure:
 
 
 def stations_figure(result: RunResult) -> Figure:
-    """Return every quantity along a beam at the last time, and of a motion the range it has had."""
+    """Return section forces and unknowns of a beam over time, a line for each station; of a steady state along it."""
     stations, title = result.stations, heading(result)
     assert stations is not None
-    last = {name: values[-1] for name, values in stations.values.items()}
+    values = {name: v for name, v in stations.values.items() if not name.startswith(("gamma", "kappa"))}
     if len(stations.t) < 2:
-        return stacked("x", stations.x, last, title)
-    ranges = {name: np.stack([v.min(axis=0), v.max(axis=0)]) for name, v in stations.values.items()}
-    title += f", t = {stations.t[-1]:.6g} s, and the range over time"
-    return stacked("x", stations.x, last, title, ranges=ranges)
+        return stacked("x", stations.x, {name: v[-1] for name, v in values.items()}, title)
+    title += f", X from {stations.x[0]:g} m (blue) to {stations.x[-1]:g} m"
+    return stacked("t", stations.t, values, title)
 
 
 # --- small motions ----------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """One HTML file of a result that needs nothing else: summary, figures that respond, modes that move, tables, scene.
 
-Figures are those of `Result.drawings`: lines and ranges become figures of Bokeh (https://docs.bokeh.org), whose script
+Figures are those of `Result.drawings`: lines become figures of Bokeh (https://docs.bokeh.org), whose script
 is in the file; maps, bars and what is drawn in three dimensions stay pictures.
 """
 
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 import tomli_w
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
@@ -153,14 +152,12 @@ def picture(figure: Figure) -> str:
 
 
 def interactive(figure: Figure) -> Any:
-    """Return a figure as one of Bokeh, its panels moving together; None if it is more than lines and ranges."""
+    """Return a figure as one of Bokeh, its panels moving together; None if it is more than lines."""
     from bokeh.layouts import gridplot
     from bokeh.models import Range1d
 
     axes = [axis for axis in figure.axes if axis.axison]
-    if not axes or any(a.name == "3d" or a.images or any(map(_is_bar, a.patches)) for a in axes):
-        return None
-    if not all(isinstance(artist, Line2D | PolyCollection) for a in axes for artist in (*a.lines, *a.collections)):
+    if not axes or any(a.name == "3d" or a.images or a.collections or any(map(_is_bar, a.patches)) for a in axes):
         return None
     x: dict[tuple[float, float], Any] = {}
     panels = [panel(a, x.setdefault(a.get_xlim(), Range1d(*map(float, a.get_xlim())))) for a in axes]
@@ -218,10 +215,6 @@ def panel(axes: Any, x_range: Any) -> Any:
         box = BoxAnnotation(left=low, right=low + width, fill_color=fill, fill_alpha=0.3, line_color=None)
         box.level = "underlay"
         plot.add_layout(box)
-    for area in axes.collections:
-        for path in area.get_paths():
-            colour, corners = to_hex(np.asarray(area.get_facecolor())[0].tolist()), np.asarray(path.vertices)
-            plot.patch(corners[:, 0], corners[:, 1], color=colour, alpha=0.25, line_width=0)
     items = [LegendItem(label=said, renderers=drawn) for said, drawn in named.items() if said and drawn]
     if items and (len(items) > 1 or len(named) > 1):
         options = {"click_policy": "hide", "label_text_font_size": "9pt", "border_line_color": None}

@@ -33,11 +33,9 @@ RUNNING = "running"
 
 #: Names of the files of results, which the next computation in the folder removes.
 RESULTS = re.compile(
-    r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns)\.csv|"
-    r"(history|loads|shape|stations|resultants|modes|mode_\d+|response|campbell_fixed)\.png|"
-    r"(campbell|explain|cost|check|compare|sweep|response)\.(csv|json|png)|modes\.json|report\.html|sweep\.nc|"
-    r"mode_\d+\.gif|state_space\.npz|[MCK]\.(mtx|npz)|(fields|modes|stations_line)\.(bp|xdmf|h5)|"
-    r"(stations|checkpoint)\.(h5|npz)"
+    r"(history|loads|shape|stations|resultants|modes|mode_(shapes|table|polynomials|\d+)|sensitivities|unknowns|fields|"
+    r"campbell(_fixed)?|unbalance\w*|explain|cost|check|compare|sweep|response|report|state_space|elastodyn_modes|"
+    r"checkpoint|[MCK])\.(csv|json|png|html|nc|gif|dat|npz|mtx|bp|xdmf|h5)"
 )
 
 #: Names of what `campbell` and `sweep` go on with, which stays.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import Columns, ShortTable, Variables, by_unit, dataset, largest, named, number
+from rotfem.results.files import write_netcdf
 from rotfem.results.result import Array, OfTable, Result
 from rotfem.short import short_fields
 
@@ -26,7 +27,7 @@ class StationHistory:
         t: times, (n,), s.
         x: positions of the stations, (m,), m.
         values: quantity ↦ its values, (n, m), in axes of the turned section; unknowns in those of the frame.
-        format: of its file, "csv" or "hdf5".
+        format: of its file, "csv" or "netcdf".
     """
 
     t: Array
@@ -43,7 +44,7 @@ class StationHistory:
 
     @property
     def columns(self) -> Columns:
-        """Columns t, x and all quantities, a row for each time and station: as CSV, HDF5, pandas or labelled arrays."""
+        """Columns t, x and all quantities, a row for each time and station: as CSV, pandas or labelled arrays."""
         n, m = len(self.t), len(self.x)
         rows = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
         return Columns(rows | {name: values.ravel() for name, values in self.values.items()}, ("t", "x"))
@@ -71,7 +72,6 @@ class RunResult(Result):
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
         stations: section forces, strains and unknowns at the stations of a beam; None where none are asked for.
         resultants: of a plate whose stress resultants are asked for, column ↦ values at its nodes at the end.
-        further: what else writes files into a folder.
     """
 
     history: dict[str, Array] = field(default_factory=dict)
@@ -80,7 +80,6 @@ class RunResult(Result):
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     stations: StationHistory | None = field(default=None, repr=False)
     resultants: dict[str, Array] = field(default_factory=dict)
-    further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
     t = OfTable("t", "Times of the history, shape (n,), s.")
 
@@ -116,11 +115,11 @@ class RunResult(Result):
         return super().texts() | ({} if stations is None else {"stations.csv": stations.columns.csv()})
 
     def large(self) -> list[Callable[[Path], object]]:
-        """Return what writes stations.h5 and files for ParaView, where these are asked for."""
+        """Return what writes stations.nc, where that is asked for."""
         stations = self.stations
-        if stations is None or stations.format != "hdf5":
-            return list(self.further)
-        return [lambda folder: stations.columns.write_hdf5(folder / "stations.h5"), *self.further]
+        if stations is None or stations.format != "netcdf":
+            return []
+        return [lambda folder: write_netcdf(folder / "stations.nc", stations.to_xarray())]
 
     def drawn(self) -> dict[str, str]:
         """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""

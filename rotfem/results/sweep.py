@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.columns import ZERO, ShortTable, label_of, numbers
-from rotfem.results.files import writing
+from rotfem.results.files import write_netcdf
 from rotfem.results.result import Rows
 
 if TYPE_CHECKING:
@@ -68,12 +68,7 @@ class SweepResult(Rows):
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes sweep.nc."""
-
-        def write(folder: Path) -> None:
-            with writing(folder / "sweep.nc"):
-                self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
-
-        return [write]
+        return [lambda folder: write_netcdf(folder / "sweep.nc", self.to_xarray())]
 
     def drawn(self) -> dict[str, str]:
         """Return sweep.png; nothing where no quantity varies."""

@@ -366,7 +366,7 @@ class OutputTable(SceneModel):
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_quantities)] = ()
     stations: Stations | None = None
     every: Count = 1
-    format: Literal["csv", "hdf5"] = "csv"
+    format: Literal["csv", "netcdf"] = "csv"
     fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
     error: StrictBool = True
     speed: AngularUnit = "rad/s"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
+import xarray
 
 import rotfem
 from rotfem.results.files import read_csv
@@ -111,10 +111,11 @@ def test_a_spin_up_over_time(tmp_path: Path) -> None:
     columns = read_csv(tmp_path / "stations.csv")
     assert list(columns) == ["t", "x", "M", "u1", "u2", "alpha"]
     np.testing.assert_array_equal(columns["M"].reshape(11, 5), coarse.stations["M"])
-    path = coarse.stations.columns.write_hdf5(tmp_path / "stations.h5")
-    with h5py.File(path) as file:
-        np.testing.assert_array_equal(file["M"][:], coarse.stations["M"])
+    rotfem.run({**scene, "output": {**output, "format": "netcdf"}}, folder=tmp_path)
+    with xarray.open_dataset(tmp_path / "stations.nc", engine="scipy") as file:
+        np.testing.assert_array_equal(file["M"], coarse.stations["M"])
         assert file["M"].attrs["units"] == "N·m"
+    assert not (tmp_path / "stations.csv").exists()
 
 
 def test_moments_of_the_spin_up() -> None:
