@@ -112,13 +112,13 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds).replace(given)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
 
-    def compute(variant: Scene) -> CampbellResult:
+    def compute(variant: Scene, *_: Any) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
         analysis = analysis_of(variant, problem, comm)
         kept = None if folder is None or analysis.comm.size > 1 else FinishedSpeeds(folder, variant)
         return diagram(variant, analysis, values, started, progress, hint, only, kept)
 
-    return answered(scene, compute, comm, "campbell")
+    return answered(scene, compute, comm, terms, top=True)
 
 
 def diagram(
