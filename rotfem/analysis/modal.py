@@ -24,7 +24,7 @@ import ufl
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.mixed_modes import KeptDigits
+from rotfem.analysis.mixed_modes import MixedModes
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import by_family, massed
 from rotfem.equations.system import System
@@ -204,7 +204,7 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         notes: remarks on the way to equilibria.
-        kept: the same modes with the stiff strains as unknowns.
+        mixed: the same modes with the stiff strains as unknowns.
     """
 
     def __init__(
@@ -226,7 +226,7 @@ class ModalAnalysis:
         self.free = self.system.hub is not None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
-        self.kept = KeptDigits(self.system)
+        self.mixed = MixedModes(self.system)
         self.notes = list[str]()
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -266,7 +266,7 @@ class ModalAnalysis:
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         if not self.free:
-            pairs = self.kept.better(pencil, pairs, count)
+            pairs = self.mixed.better(pencil, pairs, count)
         slowest = int(np.argmin(np.abs(pairs.values)))
         rigid = self.free and pairs.bounds[slowest] >= 1.0
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])

@@ -243,7 +243,7 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
 
     solved(first)
     solved(last)
-    if analysis.kept.used:  # which the model does not keep
+    if analysis.mixed.used:  # whose digits the model does not keep
         return None
     found = model()
     while gaps and len(checks) < 7:
