@@ -288,6 +288,12 @@ class ModalAnalysis:
             pencil.factor = None
         return found
 
+    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool, reference: Any = None) -> Spinning:
+        """Return what `at` has found before, or on another process, of its parts."""
+        self.system.count_rotations_from(reference)
+        pencil, clamped = self.pencils(speed, q)
+        return Spinning(speed, q, pencil, pairs, clamped, rigid, reference)
+
     def _at_own_frequencies(self, spinning: Spinning) -> None:
         """Solve every mode again with the supports as they are at its own frequency of whirl, in place.
 

@@ -252,8 +252,7 @@ class FinishedSpeeds:
         out = dict[float, Spinning]()
         for i, speed in enumerate(arrays["speeds"].tolist() if str(arrays["key"]) == self._key else []):
             q, *pairs = (arrays[f"{name}_{i}"] for name in ("q", *PAIRS))
-            pencil, clamped = analysis.pencils(speed, q)
-            out[speed] = Spinning(speed, q, pencil, Eigenpairs(*pairs), clamped, bool(arrays["rigid"][i]))
+            out[speed] = analysis.restored(speed, q, Eigenpairs(*pairs), bool(arrays["rigid"][i]))
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
@@ -281,13 +280,13 @@ def solved_by_all(
     """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
     before, ranks = list[Spinning](), analysis.everyone.size
 
-    def solve(speed: float) -> Spinning:
-        before.append(analysis.at(speed, count + SPARE, before[-1] if before else None))
+    def solve(speed: float) -> tuple[Any, ...]:
+        before.append(found := analysis.at(speed, count + SPARE, before[-1] if before else None))
         if progress is not None:
             progress(min(1.0, len(before) * ranks / len(values)))
-        return before[-1]
+        return speed, found.q, found.pairs, found.rigid, found.reference  # which another process can have
 
-    return dict(zip(values, shared_out(values, solve, analysis.everyone), strict=True))
+    return {found[0]: analysis.restored(*found) for found in shared_out(values, solve, analysis.everyone)}
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:

@@ -40,7 +40,7 @@ from rotfem.numerics.linear import (
     unknown_scale,
     use_direct_solver,
 )
-from rotfem.numerics.projection import Sendable, sparse_part, summed, times
+from rotfem.numerics.projection import sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -300,7 +300,7 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     return values, X, np.where(np.isfinite(errors), errors, 1.0)
 
 
-class Pencil(Sendable):
+class Pencil:
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
     Args:
