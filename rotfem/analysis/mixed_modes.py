@@ -171,7 +171,7 @@ class MixedModes:
             bounds = bounds + relative(round_off / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
-        pencil.spectrum_error, self.used = kept.spectrum_error, True
+        self.used = True
         return Eigenpairs(found.values, right, left, found.errors, bounds)
 
 

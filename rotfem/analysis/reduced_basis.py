@@ -8,12 +8,6 @@ which keeps symmetry and skewness. Over the speed Ω these are the polynomials t
   solutions at speeds between agree, and all modes of a diagram are those of one model (`over_range`).
 - In the other theories two speeds that are solved, and those next to them, are the nodes (`between`). K is a polynomial
   of Ω² then, as the centrifugal force that the equilibrium follows.
-
-With left vectors y and right vectors x,
-
-    dλ/dΩ = − y^H (λ² M' + λ C' + K') x / [ y^H (2λ M + C) x ]
-
-(Adhikari & Friswell 2001).
 """
 
 from __future__ import annotations
@@ -61,7 +55,7 @@ class SmallPencil(Pencil):
         if self.conservative:  # what a projection lacks of symmetry is round-off
             M, C, K = 0.5 * (M + M.T), 0.5 * (C - C.T), 0.5 * (K + K.T)
         self.M, self.C, self.K = M, C, K
-        self.comm, self.spectrum_error = MPI.COMM_SELF, None
+        self.comm = MPI.COMM_SELF
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X."""
@@ -194,13 +188,6 @@ class SpeedModel:
         right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.right, s.lifted(s.pairs.left)))
         pairs, pencil = replace(s.pairs, right=right, left=left), self._pencil(s.speed)
         return Spinning(s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
-
-    def slope(self, s: Spinning, j: int) -> complex:
-        """Return dλ/dΩ of a mode in the basis."""
-        h = 1e-4 * float(np.ptp(self._speeds))  # of a polynomial of third degree it differs by 1e-8
-        M, C, K = (self._at(s.speed + h) - self._at(s.speed - h)) / (2 * h)
-        lam, x, y = s.pairs.values[j], s.pairs.right[:, j], s.pairs.left[:, j]
-        return complex(-(y.conj() @ (lam**2 * M + lam * C + K) @ x) / s.own[j, j])
 
 
 def between(solved: Sequence[Spinning], neighbours: Sequence[Spinning]) -> SpeedModel:

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -137,12 +136,10 @@ def diagram(
     sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
     if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
-    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if sweep.model is None:
-            left = [speed for speed in values if speed not in sweep.known]
-            sweep.known |= solved_by_all(analysis, left, count, progress)
-            sweep.solves += len(left)
-        sweep.each = partial(shared_out, comm=analysis.everyone)
+    if analysis.everyone.size > analysis.comm.size and sweep.model is None:  # each process has a copy
+        left = [speed for speed in values if speed not in sweep.known]
+        sweep.known |= solved_by_all(analysis, left, count, progress)
+        sweep.solves += len(left)
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))

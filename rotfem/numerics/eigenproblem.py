@@ -170,13 +170,6 @@ def matched(values: Array, others: Array, vectors: Array) -> Array:
     return _pick(vectors, others, values).conj()
 
 
-def mirror_error(values: Array) -> float:
-    """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
-    inner = values[(np.abs(values) <= np.median(np.abs(values))) & (values != 0.0)]  # 0 mirrors itself
-    distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
-    return float(np.max(distance / np.abs(inner), initial=0.0))
-
-
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
     """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
     distance = np.abs(values[None, :] - wanted[:, None])
@@ -330,7 +323,6 @@ class Pencil:
         self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
-        self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X for complex columns X, or a vector, of locally owned unknowns."""
@@ -403,7 +395,6 @@ class Pencil:
             return self._damped(count, target)
         if self.conservative:
             left = mirrored(values, right)
-            self.spectrum_error = mirror_error(values)
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = matched(values, *self._right(M, C, K, count, target)[:2])
