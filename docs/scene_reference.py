@@ -217,7 +217,7 @@ def kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
         return ", ".join(f'`"{name}"`' for name in arguments)
     if isinstance(annotation, type) and issubclass(annotation, SceneModel):
         name = re.sub("([a-z])([A-Z])", r"\1 \2", annotation.__name__.removesuffix("Table")).lower()
-        return name if issubclass(annotation, loads.Given) else "table"
+        return name if issubclass(annotation, loads.Signal) else "table"
     if origin in (typing.Union, UnionType):
         return ", ".join(dict.fromkeys(kind(a) for a in arguments if a is not NoneType))
     if any(getattr(m, "func", None) is padded for m in metadata):

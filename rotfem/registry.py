@@ -34,7 +34,7 @@ class Registry(Generic[E]):
     """
 
     def __init__(self, kind: str, *homes: str):
-        self.kind, self._homes, self._order = kind, homes, homes
+        self.kind, self._homes = kind, homes
         self._entries: dict[str, E] = {}
 
     def add(self, entry: E) -> None:
@@ -57,10 +57,9 @@ class Registry(Generic[E]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names: of several homes in the order of these, whichever was imported first."""
+        """All names."""
         self._load()
-        order = {home: place for place, home in enumerate(self._order)}
-        return tuple(sorted(self._entries, key=lambda name: order.get(self._entries[name].__module__, len(order))))
+        return tuple(self._entries)
 
     def __getitem__(self, name: str) -> E:
         self._load()

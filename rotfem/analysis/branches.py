@@ -15,6 +15,7 @@ Where the model is that of a basis over the whole range, it is exact, and nothin
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,14 +24,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.linalg import norm
+from scipy.linalg import eigh
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, correlation, stability
 from rotfem.analysis.reduced_basis import SpeedModel, between, with_errors
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
-from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES
-from rotfem.structures.mode_names import Wave
+from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, repeated
+from rotfem.numerics.projection import sparse_part
+from rotfem.structures.mode_names import Wave, ordinal_ending
 
 Array = npt.NDArray[Any]
 
@@ -48,6 +52,9 @@ ZEROS, LAST, NEAR, SOLUTIONS = 1e-11, 3e-4, 1e-4, 5
 #: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
 #: multiplied by about its reciprocal.
 NODES_APART = 1e-4
+
+#: Relative difference of matrices that are one, and unknowns of which all synchronous whirls are solved together.
+SAME, MOST_DENSE = 1e-9, 2000
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
 SPARE = 3
@@ -337,12 +344,16 @@ class Sweep:
             ranges: of instability (see `onsets`).
         """
         static = [(r["speed"], r["until"] or np.inf) for r in ranges if r["kind"] == "static instability"]
+        speeds = [point.speed for point in self.points]
+        own = synchronous(self.analysis, speeds[0], speeds[-1], self.count)
         out: list[dict[str, Any]] = []
 
-        def add(branch: int, kind: str, order: int, k: int, speed: float) -> None:
+        def add(branch: int, kind: str, order: int, k: int, speed: float, **more: str) -> None:
             named = {"speed": speed, "kind": kind, "order": order, "per_rev": k}
-            out.append(named | {"branch": branch + 1, "frequency": k * abs(speed)})
+            out.append(named | {"branch": branch + 1, "frequency": k * abs(speed), **more})
 
+        for speed, way, n in own or ():
+            add(-1, way, 1, 1, speed, label=f"{n}{ordinal_ending(n)} {way} whirl")
         for i, b in product(range(len(self.paths)), range(self.count)):
             left, right = self.points[i : i + 2]
             before, wave, way = self.wave(left, b), self.wave(right, b), self.direction(right, b)
@@ -352,10 +363,11 @@ class Sweep:
                     for end in filter(np.isfinite, within[0] if within else [speed]):
                         add(b, "forward", 1, 0, end)
             at_rest = 0 if wave is None else wave.at_rest
-            for k in sorted({*orders, at_rest} - {0}):
+            known = {1} if own is not None and wave is not None and wave.number else set[int]()
+            for k in sorted({*orders, at_rest} - {0} - known):
                 for speed in self._meetings(i, b, k):
-                    if wave is not None and k == at_rest and (way == "backward" or (wave.fixed and way)):
-                        add(b, way, wave.number, k, speed)
+                    if wave is not None and k == at_rest and (way == "backward" or (wave.fixed and wave.number)):
+                        add(b, way or ("forward" if wave.share > 0.0 else "backward"), wave.number, k, speed)
                     elif k in orders:
                         add(b, "per_rev", k, k, speed)
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
@@ -451,6 +463,49 @@ class Sweep:
         grows = max((lam.real for lam, _ in growing(path.model.modes(speed - least, count))), default=0.0)
         typical = np.median(np.abs(path.left.spinning.pairs.values))
         return None if after is None and grows > 1e-2 * typical else speed
+
+
+def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) -> list[tuple[float, str, int]] | None:
+    """Return (speed, direction, number among those) of the critical speeds of an undamped shaft; None of other rotors.
+
+    Whirl e^{iΩt} at the speed Ω, at which C = ΩG, is an eigenvector of (K − Ω² (M − iG)) x = 0; all three are constant
+    and the pencil is Hermitian, so that one solution has all of them (Genta 2005, section 4.5), whatever the grid.
+
+    Args:
+        analysis: of the shaft.
+        low: first speed of the range, rad/s.
+        high: last speed.
+        count: number of speeds, at most.
+    """
+    top, names = max(abs(low), abs(high)), list(analysis.structure.unknowns)
+    free = np.tile([n not in ("u1", "theta1") for n in names], analysis.system.V.dofmap.index_map.size_local)
+    if not analysis.fixed or analysis.comm.size > 1 or len(free) > MOST_DENSE or top == 0.0 or analysis.mixed.used:
+        return None
+    free[analysis.system.clamped] = False
+    at = [analysis.pencils(speed, analysis.equilibrium(speed))[0] for speed in (0.0, top)]
+    if any(sparse_part(pencil.C) is not pencil.C for pencil in at):
+        return None
+    (M, C_0, K_0), (_, C, K) = ([A[:, :][np.ix_(free, free)] for A in (p.M, p.C, p.K)] for p in at)
+    d = 1.0 / np.sqrt(np.abs(np.diag(K_0)))
+    M, C_0, K_0, C, K = (d[:, None] * A * d for A in (M, C_0, K_0, C, K))
+    damped = max(norm(C_0), norm(C + C.T)) > SAME * top * norm(M)
+    if damped or max(norm(K - K_0), norm(K - K.T)) > SAME * norm(K):
+        return None
+    try:
+        inverse, X = eigh(M - 1j * C / top, K)  # 1/Ω²
+    except np.linalg.LinAlgError:  # nothing holds it
+        return None
+    kind, sense = np.array(names)[np.flatnonzero(free) % len(names)], np.sign(analysis.problem.motion.axis[0])
+    found, X = 1.0 / np.sqrt(inverse[inverse > 0.0])[::-1], (d[:, None] * X)[:, ::-1]
+    y, z, numbers = X[kind == "u2"], X[kind == "u3"] * sense, Counter[str]()
+    out = list[tuple[float, str, int]]()
+    for group in repeated(found, np.zeros(len(found))):
+        with_it, against = (y[:, group] + sign * 1j * z[:, group] for sign in (1.0, -1.0))
+        shares = np.linalg.eigvalsh(with_it.conj().T @ with_it - against.conj().T @ against)
+        for speed, share in zip(found[group].tolist(), shares, strict=True):
+            numbers[way := "forward" if share > 0.0 else "backward"] += 1
+            out += [(signed, way, numbers[way]) for signed in (-speed, speed) if low <= signed <= high]
+    return out[:count]
 
 
 def growing(spinning: Spinning) -> list[tuple[complex, str]]:

@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 from mpi4py import MPI
+from numpy.polynomial.polynomial import polyder, polyval
 
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.time_grid import CLOSE
@@ -106,12 +107,7 @@ def _coefficients(known: int) -> tuple[Array, Array]:
 
 def derivatives(curve: Array, x: Array) -> list[Array]:
     """Return polynomials of coefficients (powers, number) and their first two derivatives at x, (n, number) each."""
-    out = []
-    for _ in range(3):
-        powers = np.arange(len(curve))
-        out.append(x[:, None] ** powers @ curve)
-        curve = powers[1:, None] * curve[1:]
-    return out
+    return [np.asarray(polyval(x, polyder(curve, k)), dtype=np.float64).T for k in range(3)]
 
 
 def write_state(system: System, state: State) -> None:

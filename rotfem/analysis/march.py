@@ -183,7 +183,9 @@ class March:
         end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
-        knots = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        signals = self.system.signals
+        found = knots_of(signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        knots = np.unique(np.concatenate([found, *(s.bent for s in signals)]))
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 
@@ -274,11 +276,7 @@ class March:
     # --- one step ----------------------------------------------------------------------------------------------------
 
     def advance(self, state: State, h: float, end: float, halvings: int = HALVINGS) -> State:
-        """Return the state at an end (s), state.t + h but for rounding, in halved steps where Newton fails.
-
-        Raises:
-            ComputationError: Newton failed at the smallest step too; says how small it was.
-        """
+        """Return the state at an end (s), state.t + h but for rounding, in halved steps where Newton fails."""
         try:
             return self.step(state, h, end)
         except ComputationError as failure:
@@ -293,11 +291,7 @@ class March:
         return self.advance(middle, h / 2, end, halvings - 1)
 
     def step(self, state: State, h: float, end: float) -> State:
-        """Return the state at an end (s), after a step of length h (s): its stages predicted and solved.
-
-        Raises:
-            ComputationError: Newton failed.
-        """
+        """Return the state at an end (s), after a step of length h (s): its stages predicted and solved."""
         if keep_rotations_small(self.system, self.scheme, state, h):
             self.last.shifts = None
         start = state if state.jump is None else self._filtered(state, h)
@@ -315,9 +309,6 @@ class March:
 
         Where that fails it starts once more from the state. Of a large system a factor serves as long as increments
         shrink by it (see `Factor`).
-
-        Raises:
-            ComputationError: it does not converge, or to a state that is turned inside out.
         """
         s, newton, last, span = self.system, self.newton, self.last, stage.over
         s.set_time(stage.t)
@@ -383,10 +374,7 @@ class March:
     def begun(self, state: State, before: View, part: Interval) -> State:
         """Return a state as an interval starts from it: with the accelerations after a jump of what drives the system.
 
-        Args:
-            state: at the end of a step.
-            before: how that step evaluates signals here.
-            part: the interval.
+        `before` is how the step that ends with it evaluates signals.
         """
         after = View(1, part.line)
         if before.side == 0 and before.line == part.line:

@@ -150,7 +150,8 @@ class MixedModes:
             return pairs
         kept, stressed = self._at_state(pencil.M, pencil.C, pencil.unit or 1.0)
         try:
-            found = kept.solve(count)
+            kept.overdamped = pencil.overdamped
+            found = kept.first(count)
         except ComputationError:
             return pairs
         n = pairs.right.shape[0]

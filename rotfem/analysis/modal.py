@@ -221,6 +221,7 @@ class ModalAnalysis:
         self.free = self.system.hub is not None
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
+        self._overdamped = 0 if self.fixed else None
         self.mixed = MixedModes(self.system)
         self.notes = list[str]()
         assembled = self.system.assembled
@@ -258,8 +259,8 @@ class ModalAnalysis:
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.factor = self.system.analysed
-        pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
-        self._unit = pencil.unit
+        pairs = pencil.first(count, clamped.scale() if self.free else 0.0)
+        self._unit, self._overdamped = pencil.unit, pencil.overdamped
         if not self.free:
             pairs = self.mixed.better(pencil, pairs, count)
         slowest = int(np.argmin(np.abs(pairs.values)))
@@ -340,6 +341,7 @@ class ModalAnalysis:
         clamped = Pencil(*matrices)
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         clamped.unit = pencil.unit = self._unit
+        pencil.overdamped = self._overdamped
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
         return pencil, clamped

@@ -137,6 +137,7 @@ class SpeedModel:
             if not speeds:
                 self.lift = (V, products[0])
             speeds.append(speed)
+            self._overdamped = pencil.overdamped
             matrices.append([summed(pencil.comm, V.T @ AV) for AV in products])
             self._asymmetries = {k: max(x, pencil.asymmetries[k]) for k, x in self._asymmetries.items()}
         self._speeds: Array = np.array(speeds)
@@ -162,16 +163,18 @@ class SpeedModel:
 
     def _pencil(self, speed: float) -> SmallPencil:
         M, C, K = self._at(speed)
-        return SmallPencil(M, C, K, self._asymmetries)
+        pencil = SmallPencil(M, C, K, self._asymmetries)
+        pencil.overdamped = self._overdamped
+        return pencil
 
     def modes(self, speed: float, count: int = 0) -> Spinning:
         """Return modes at a speed (rad/s), their vectors in the basis; by default some more than the model is of."""
         pencil, count = self._pencil(speed), count or self.count + FURTHER
         try:
-            pairs = pencil.solve(count)
+            pairs = pencil.first(count)
         except ComputationError:  # K is singular: aim beside zero
             least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
-            pairs = pencil.solve(count, 0.1 * float(np.sqrt(least)))
+            pairs = pencil.first(count, 0.1 * float(np.sqrt(least)))
         return Spinning(speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
 
     def singular(self, low: float, high: float) -> Array:

@@ -61,14 +61,7 @@ class Interval:
 
 
 def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
-    """Yield the intervals of all steps.
-
-    Args:
-        knots: of the prescribed data, s.
-        times: ends of the steps, the first the start of the march, s.
-        step: nominal length of a step, s.
-        divided: whether steps are taken from knot to knot where these are few.
-    """
+    """Yield the intervals of steps between times (s), nominally `step` long (s), `divided` at few knots (s)."""
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]
@@ -96,11 +89,13 @@ def knots_of(
 ) -> Array:
     """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
 
-    Steps of second order (not `divided`, see `intervals`) do without those that they resolve.
+    Steps of second order (not `divided`, see `intervals`) do without those that they resolve, others without kinks of
+    rates if these are many.
     """
     for signal in signals:
         find_jumps(signal, times, breakpoints)
-    of_signals = (s.knots if divided else unresolved(s, times) for s in signals)
+    rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
+    of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
     found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
     return found
 

@@ -85,6 +85,6 @@ def frozen_in_frame(problem: Problem) -> list[str]:
     found = {
         "structure.root.pitch changes with time": motion.pitch is not None,
         "loads.gravity turns in the rotating frame": problem.gravity_turns,
-        "motion.base_acceleration changes with time": motion.is_accelerated and motion.base_knots != (),
+        "motion.base_acceleration changes with time": motion.base is not None and not motion.base.constant,
     }
     return [f"{what}: taken as at t = 0" for what, there in found.items() if there]

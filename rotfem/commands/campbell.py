@@ -31,7 +31,7 @@ from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
-from rotfem.results import CampbellResult
+from rotfem.results.campbell import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST
@@ -159,7 +159,10 @@ def diagram(
     rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
     check_rows(rows)
     for crossing in crossings:
-        crossing["label"] = labels[crossing["branch"] - 1]
+        if "label" in crossing:  # of no branch, it is known by its name
+            crossing["branch"] = 1 + labels.index(crossing["label"]) if crossing["label"] in labels else 0
+        else:
+            crossing["label"] = labels[crossing["branch"] - 1]
     goes_on = "" if kept is None else "; the same command goes on from there"
     done = f"{sum(p.requested for p in sweep.points)} of {len(values)} speeds are finished, up to "
     warnings = [
@@ -220,7 +223,9 @@ def meetings(
 ) -> tuple[Sequence[int], list[dict[str, Any]], list[dict[str, Any]]]:
     """Return the orders k of the lines kΩ, critical speeds and ranges of instability."""
     sweep.count = min(sweep.count, len(sweep.points[0].order))
-    if orders is None:
+    if orders is None and sweep.analysis.fixed:
+        orders = (1, 2)
+    elif orders is None:
         fastest = max(abs(point.speed) for point in sweep.points)
         highest = np.nanmax([point.value(b).imag for point in sweep.points for b in range(sweep.count)])
         orders = range(1, 1 + int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4)))
@@ -340,7 +345,8 @@ def point_rows(
 ) -> list[dict[str, Any]]:
     """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
     columns, rows = mode_rows(analysis, point.spinning.first(1 + max(point.order[: len(labels)]))), []
-    own, of_rotors = "frequency frequency_hz damping growth residual error_bound", "turning whirl frequency_fixed"
+    own = ["frequency", "frequency_hz", "damping", "growth", "residual", "error_bound"]
+    of_rotors = ["turning", "whirl", "frequency_fixed", "frequency_fixed_2", "log_decrement"]
     for b, label in enumerate(labels):
         if point.order[b] < 0:
             continue
@@ -351,9 +357,9 @@ def point_rows(
                 "branch": b + 1,
                 "label": label,
                 "mode": row["label"],
-                **{name: row[name] for name in own.split()},
+                **{name: row[name] for name in own},
                 **({} if mesh is None else {"mesh_error": mesh[b]}),
-                **{k: v for k, v in row.items() if k.startswith("share_") or k in of_rotors.split()},
+                **{k: v for k, v in row.items() if k.startswith("share_") or k in of_rotors},
                 "confidence": float(point.confidence[b]),
                 "refined": int(not point.requested),
             }

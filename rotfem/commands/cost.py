@@ -200,7 +200,7 @@ def chosen(
         *(("schemes", "time.scheme", name) for name in schemes or ()),
     ]:
         try:
-            scene.replace({"model.prestress": None, **(unset if option == "schemes" else {}), key: name})
+            Problem.of(scene.replace({"model.prestress": None, **(unset if option == "schemes" else {}), key: name}))
         except SceneError as error:
             raise SceneError(scene.file, f"cost --{option}", name, error.allowed) from None
     named = list(theories or [t.name for t in there if not quick or t.quick or t.name == own])

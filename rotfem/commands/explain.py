@@ -41,8 +41,8 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.results import ExplainResult
 from rotfem.results.distance import Series, Spectrum
+from rotfem.results.of_scene import ExplainResult
 from rotfem.scene import Scene, as_scene
 
 Array = npt.NDArray[Any]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.commands.fields import modes_writer, surface_of
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.structures.mode_names import Wave, distinct
 from rotfem.units import speed_text
 
@@ -73,7 +74,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 "growth": float(lam.real),
                 "stability": stability(lam, float(bound)),
                 **{f"share_{name}": float(share[i]) for name, share in described.shares.items()},
-                **(whirl(waves[i], float(lam.imag), abs(spinning.speed)) if waves else {}),
+                **(whirl(waves[i], lam, abs(spinning.speed)) if waves else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
             }
@@ -81,11 +82,17 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
     return rows
 
 
-def whirl(wave: Wave, omega: float, speed: float) -> dict[str, Any]:
-    """Return what a row says of the precession of a mode of a rotor (see `rotfem.CampbellResult`)."""
+def whirl(wave: Wave, lam: complex, speed: float) -> dict[str, Any]:
+    """Return what a row says of the precession of a mode λ of a rotor (see `rotfem.CampbellResult`)."""
+    omega = float(lam.imag)
     direction = wave.direction(omega, speed)
-    fixed = abs(wave.seen_fixed(omega, speed)) if direction else omega
-    return {"turning": wave.share, "whirl": direction or "standing", "frequency_fixed": fixed}
+    fixed = abs(wave.seen_fixed(omega, speed)) if direction or wave.shaft else omega
+    out = {"turning": wave.share, "whirl": direction or "standing", "frequency_fixed": fixed}
+    if wave.shaft and wave.fixed:
+        out["log_decrement"] = float(-2 * np.pi * lam.real / omega) if omega > 0.0 else None
+    elif wave.shaft:
+        out["frequency_fixed_2"] = abs(replace(wave, share=-wave.share).seen_fixed(omega, speed))
+    return out
 
 
 def instabilities(rows: list[dict[str, Any]]) -> list[str]:
@@ -125,13 +132,15 @@ def doubtful(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
-    """Return warnings about the model: a rotating-frame frequency without Coriolis forces is not one."""
+    """Return warnings about the model: a plate that is nearly a disk, frequencies without Coriolis forces."""
+    doubt = getattr(analysis.structure, "doubt", "")
+    found = [doubt] if doubt else []
     if speed != 0.0 and "coriolis" not in analysis.model.effects:
-        return [
+        found.append(
             "coriolis is not among model.effects: frequencies in the rotating frame are wrong without it, and ω² can "
             "come out negative"
-        ]
-    return []
+        )
+    return found
 
 
 def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:

@@ -31,7 +31,7 @@ from rotfem.listeners import Compiling, Hint, cpu_time, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result
 from rotfem.scene import Scene, as_scene
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, cast
 
@@ -22,15 +21,14 @@ from rotfem.equations.system import System
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
-from rotfem.mechanics.loads import Loads, load_of
-from rotfem.mechanics.motion import Motion, no_acceleration
+from rotfem.mechanics.loads import load_of
+from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.loads import LoadsTable
 from rotfem.scene.settings import estimates_error
 from rotfem.units import si
 from rotfem.users_functions import number_of
@@ -144,13 +142,6 @@ def first_shape(system: System, start: Array | Moment | None) -> Array | None:
 class Problem(ProblemData):
     """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`); `loads` as `rotfem.Loads`."""
 
-    def __post_init__(self) -> None:
-        given: Any = self.loads
-        if isinstance(given, LoadsTable):
-            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
-            object.__setattr__(self, "loads", made)
-        super().__post_init__()
-
     @classmethod
     def of(
         cls,
@@ -174,14 +165,13 @@ class Problem(ProblemData):
         if twice := [name for name in outputs or {} if name in wanted]:
             raise SceneError(scene.file, "output.quantities", twice[0], "is the name of an output of the call, too")
         with input_of(scene.file):
-            motion = motion_of(scene)
             return cls(
                 structure=scene.structure,
-                motion=motion,
+                motion=motion_of(scene),
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=scene.model.effects if isinstance(scene.model.effects, tuple) else None,
-                loads=Loads.of(scene.loads, scene.structure, motion.angle).pitched(motion.pitch),
+                loads=cast(Any, scene.loads),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,
                 terms=terms or {},
@@ -295,18 +285,11 @@ def scheme_of(time: Time) -> Scheme:
 def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
-    given = m.base_acceleration
+    given, more = m.base_acceleration, dict[str, Any]()
     base = None if given is None else load_of("motion.base_acceleration", given, scene.structure, float)
-    more = {
-        "base_acceleration": no_acceleration if base is None else base.at,
-        "is_accelerated": base is not None and not base.is_zero,
-        "base_knots": base.knots if base is not None and base.linear else None,
-    }
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
-    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
-    if base is not None and not base.constant:
-        motion = replace(motion, constant=False)
+    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, "base": base, **more})
     return with_pitch(scene, motion) if scene.structure.pitches else motion
 
 
@@ -336,23 +319,23 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
     """Return the motion of a scene with the pitch of its blade, which may change with time."""
     structure: Any = scene.structure
     given = structure.root.pitch
-    parts = [constant_pitch(given.value or 0.0)]
-    parts += [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]
+    angles, parts = given.over_time, [constant_pitch(given.value[0] if given.value else 0.0)]
+    parts += [harmonic_pitch(h.amplitude[0], h.phase, _turn(h, motion)) for h in given.harmonic]
     knots = motion.sharp if any(h.per_rev is not None for h in given.harmonic) else ()
-    if given.table is not None:
-        parts.append(tabulated_pitch(given.table))
-        knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
-    if given.function is not None:
+    if callable(angles):
         key = "structure.root.pitch"
         rate = given.rate and number_of(given.rate, f"{key}.rate", "time")
-        parts.append(differentiated(number_of(given.function, key, "time"), rate, cell_of(scene.time)))
+        parts.append(differentiated(number_of(angles, key, "time"), rate, cell_of(scene.time)))
+    elif angles is not None:
+        parts.append(tabulated_pitch(angles))
+        knots = tuple(sorted({*knots, *(row[0] for row in angles)}))
 
     def summed(i: int) -> Scalar:
         return lambda t: sum(part[i](t) for part in parts)
 
     angle, rate, acceleration = map(summed, range(3))
     axis, root = np.array(structure.root_axis), np.array(structure.root_position)
-    known = given.function is None and not given.harmonic
+    known = not callable(angles) and not given.harmonic
     return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.dense_output import write_state
-from rotfem.analysis.equilibrium import LargestState
+from rotfem.analysis.equilibrium import conditioning, rounding_message
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
@@ -64,14 +65,15 @@ class Monitor:
 
     Attributes:
         since: from when on (s) the speed was above the critical one; None before.
-        farthest: largest state so far.
+        farthest: of a linear theory the largest component of displacements over the length or of rotations (rad) so
+            far, by which round-off is judged, its time (s) and state.
         stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
     """
 
     def __init__(self, system: System, critical: float | None):
         self.system, self.critical = system, critical
         self.since: float | None = None
-        self.farthest = LargestState(system)
+        self.farthest: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
         self.stability: Stability | None = None
 
     def step(self, state: State) -> None:
@@ -109,7 +111,20 @@ class Monitor:
         """Take note of a state that is recorded."""
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
-        self.farthest(state.q, state.t)
+        elif (size := float(np.max(self.system.sizes(state.q), initial=0.0))) > 1.02 * self.farthest[
+            0
+        ]:  # some are copied
+            self.farthest = (size, state.t, np.array(state.q))
+
+    def round_off(self) -> str:
+        """Return the warning of what round-off may have done to the largest state, which it sets; empty if little."""
+        size, t, q = self.farthest
+        if size < 0.0:
+            return ""
+        self.system.set_time(t)
+        with suppress(ComputationError):
+            return rounding_message(conditioning(self.system, q[: len(self.system.scale)], t or np.inf))
+        return ""
 
 
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:
@@ -138,8 +153,7 @@ class ResultantRows:
     """Takes the states of the rows of a history of a plate, its hub held, and keeps named resultants.
 
     Attributes:
-        frames: values (nodes, names) at the times of the fields' snapshots, which the recorder adds.
-        last: at the last row.
+        last: values (nodes, names) at the last row.
         largest: largest equivalent stress (Pa) so far, where, and when: value, x, y (m), t (s).
     """
 
@@ -149,7 +163,6 @@ class ResultantRows:
         self._nodes = system.structure.nodes(system.zeros())[0]
         self._columns = [self._resultants.names.index(name) for name in names]
         self._stress = self._resultants.names.index(STRESS)
-        self.frames = Snapshots()
         self.last: Array | None = None
         self.largest: tuple[float, ...] = ()
 
@@ -267,9 +280,7 @@ class Recorder:
         self.history.append(row)
         self._last = state
         if self.snapshots is not None:
-            self.snapshots.add(state.t, state.q)
-            if self.resultants is not None and self.resultants.last is not None:
-                self.resultants.frames.add(state.t, self.resultants.last)
+            self.snapshots.add(state.t, state.q, None if self.resultants is None else self.resultants.last)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""
@@ -283,8 +294,8 @@ class Recorder:
         if self.stations is not None:
             out.stations = self.stations.result()
         if self.snapshots is not None and self.snapshots.kept:
-            more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
-            out.fields = fields_writer(self.system, self.snapshots.kept, more)
+            names = () if self.resultants is None else self.resultants.names
+            out.fields = fields_writer(self.system, self.snapshots, names)
         if self.resultants is not None:
             out.resultants = self.resultants.columns()
         return out

@@ -193,7 +193,7 @@ class Simulation:
             self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
             march.observers.append(self.rows)
         march.observers.append(self._leg)
-        with self.store.interrupts():
+        with self.store.interrupts:
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
                 self._stepped(state, time)
@@ -249,7 +249,7 @@ class Simulation:
                 f"the speed is above {speed_text(watched.critical)}, where the {self.problem.theory.name} stiffness is "
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
-        log.warnings += [lost] if (lost := watched.farthest.warning()) else []
+        log.warnings += [lost] if (lost := watched.round_off()) else []
         found = self._summary(status, history)
         if self.record.resultants is not None:
             found["stress"] = self.record.resultants.summary()

@@ -50,12 +50,10 @@ ARRAY, CLASS = "#array", "#class"
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
     "log": ("steps", "parts", "warnings", "resumed"),
-    "monitor": ("since", "stability"),
-    "monitor.farthest": ("seen",),
+    "monitor": ("since", "stability", "farthest"),
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
-    "record.resultants.frames": ("kept", "_every", "_count"),
     "march": ("substeps", "rejected"),
     "march.last": ("long", "confirmed"),
     "march.newton": ("iterations", "roundoff", "_kappa", "_longest"),
@@ -164,7 +162,7 @@ def read_checkpoint(path: Path) -> Tree:
     """Return the tree of a checkpoint file; tuples have become lists."""
     if not path.exists():
         raise refused(path, "there is no checkpoint; start the run with --checkpoint, and without --resume")
-    with checkpoint_of(path), np.load(path, allow_pickle=False) as file:
+    with np.load(path, allow_pickle=False) as file:
         head = file["head"].tobytes()
         if (there := json.loads(head)["rotfem"]) != __version__:
             why = f"was written by rotfem {there}, this is {__version__}; start the run anew, without --resume"
@@ -238,6 +236,9 @@ class RunStore:
         folder: where its results go; None keeps nothing.
         every: from one checkpoint to the next, see `interval`; None writes none.
         resume: whether the run goes on from the checkpoint in the folder.
+
+    Attributes:
+        interrupts: context in which a march is interrupted between steps.
     """
 
     def __init__(
@@ -251,7 +252,7 @@ class RunStore:
         self._run: Memory | None = None
         self._tree: Tree | None = None
         self._identity: Tree = {}
-        self._interrupts = Interrupts(comm.size == 1)
+        self.interrupts = Interrupts(comm.size == 1)
         self._written = monotonic()
 
     @property
@@ -281,10 +282,6 @@ class RunStore:
         if self.resume:
             self._tree = self.folder.first_does(read)
             self.every = self.every or self._tree["every"]
-
-    def interrupts(self) -> Interrupts:
-        """Return the context in which a march is interrupted between steps."""
-        return self._interrupts
 
     def start(self, run: Memory) -> State | None:
         """Begin the results of a run; return the state of the checkpoint that it goes on from, None without."""
@@ -320,7 +317,7 @@ class RunStore:
 
         Ranks that share a mesh talk to each other after every step, others, whose steps are quick, seldom.
         """
-        asked, every, steps = self._interrupts.asked, self.every, run.log.steps
+        asked, every, steps = self.interrupts.asked, self.every, run.log.steps
         due = isinstance(every, int) and steps > 0 and steps % every == 0
         late = isinstance(every, float) and steps > 0 and monotonic() - self._written >= every
         if self.comm.size > 1:

@@ -63,6 +63,8 @@ def unbalance(
             raise InputError("structure", None, f"{why}; its frame is {problem.frame}")
         if not problem.unbalances:
             raise InputError("loads.unbalance", None, "give one, or a mass with an offset across the axis")
+        if operating is not None and not 0.0 < operating[0] <= operating[1]:
+            raise SceneError("command line", "--operating", list(operating), "must increase, from above 0")
         for x, _ in probes:
             if not 0.0 <= x <= (shown.structure.length or 0.0):
                 raise SceneError("command line", "--probe", x, f"must be from 0 to {shown.structure.length:g} m")

@@ -23,25 +23,17 @@ free hub contains no forces between hub and structure.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from petsc4py import PETSc
-from ufl.algorithms import expand_derivatives
 
-from rotfem.equations.modal_damping import EFFECT, ByMode
+from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
-from rotfem.mechanics import work
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.rotations import turned_vectors
-from rotfem.mechanics.work import Variation
-from rotfem.numerics import forms
-from rotfem.numerics.forms import added
-from rotfem.numerics.projection import times, times_transposed
+from rotfem.numerics.projection import times_transposed
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Structure
 
@@ -130,116 +122,6 @@ class RootReaction:
         ends = grid.ends("clamped")
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         return np.asarray(lengths @ ends.mean(axis=1) / lengths.sum())
-
-
-class Assembled(Protocol):
-    """What `ClampWork` reads of a nonlinear system (`rotfem.equations.nonlinear`)."""
-
-    model: Model
-    root: RootReaction
-    clamped: npt.NDArray[Any]
-    by_mode: ByMode | None
-    V: Any
-    q: Any
-    v: Any
-
-    def sum_of(self, parts: list[Any]) -> Array:
-        """Return compiled linear forms added up."""
-
-    def whole(self, kind: str) -> Any:
-        """Return K, C or M with the rows of the clamp."""
-
-    def whole_of(self, parts: list[Any]) -> Any:
-        """Return compiled bilinear forms added up with the rows of the clamp."""
-
-
-class ClampWork:
-    """The constraint forces of the clamp, as work in the unit motions."""
-
-    def __init__(self, system: Assembled):
-        self._system, weights = system, system.root.weights
-        fixed = np.zeros((len(weights), 1), dtype=bool)
-        fixed[system.clamped] = True
-        self._motions: Array = weights[system.clamped]
-        self._fixed, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
-
-    def __call__(self, residual: Array) -> Array:
-        """Return this process's part of their work at the state set, (motions,), of F with its clamped rows."""
-        system = self._system
-        reaction = np.asarray(residual[system.clamped] @ self._motions) - self._damping()
-        if not self._springs:
-            return reaction
-        forces = system.sum_of(self._springs)[: len(self._turns)]
-        return np.asarray(reaction - forces @ self._turns)  # springs act against the turns of hinges
-
-    @cached_property
-    def _springs(self) -> list[Any]:
-        """The work of springs and dampers of the root, compiled; empty without any."""
-        terms = self._terms
-        return [forms.form(added(terms), once=True)] if terms else []
-
-    @property
-    def _terms(self) -> list[Any]:
-        model = self._system.model
-        terms = [term for name, term in model.terms.items() if model.acting[name].at_root]
-        return [term for term in terms if not expand_derivatives(term).empty()]  # of turns that are left out
-
-    def tangents(self) -> tuple[Array, Array, Array]:
-        """Return the derivatives of these forces to q, v and a about an equilibrium, (unknowns, motions) each."""
-        system = self._system
-        wholes = {kind: system.whole(kind) for kind in "KCM"}
-        K, C, M = (self._rows_times(wholes[kind], self._fixed) for kind in "KCM")
-        if self._springs:
-            du, terms = ufl.TrialFunction(system.V), added(self._terms)
-            for part, x in ((K, system.q), (C, system.v)):
-                slope = forms.form(ufl.derivative(terms, x, du), once=True)
-                part -= self._rows_times(system.whole_of([slope]), self._turns)
-        return K, C - self._damping_tangent(wholes["M"]), M
-
-    @staticmethod
-    def _rows_times(A: Any, columns: Array) -> Array:
-        """Return Aᵀ times columns; zero of None."""
-        return np.zeros_like(columns) if A is None else times_transposed(A, columns)
-
-    # --- forces between the hub and all of the structure ----------------------------------------------------------
-
-    @cached_property
-    def _by_mass(self) -> list[Any]:
-        """The work of a0 M v, compiled; empty without."""
-        model = self._system.model
-        m = model.mechanics
-        if EFFECT not in model.effects or m.damping.mass is None:
-            return []
-        alone = replace(m, damping=replace(m.damping, stiffness=None))
-        return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
-
-    def _damping_tangent(self, M: Any) -> Array | float:
-        """Return their derivatives to velocities, (owned unknowns, motions), of M with the rows of the clamp."""
-        system, by_mode = self._system, self._system.by_mode
-        mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
-        if mass is None and by_mode is None:
-            return 0.0
-        rigid = system.root.carried(system.q.x.array)
-        out: Array = np.zeros_like(rigid)
-        if mass is not None:
-            out += float(mass.value) * times(M, rigid)
-        if by_mode is not None:
-            out += by_mode.times(rigid)
-        return out
-
-    def _damping(self) -> Array | float:
-        """Return this process's part of the work of the damping forces at the state set, (motions,); 0 without."""
-        system, by_mode = self._system, self._system.by_mode
-        if not self._by_mass and by_mode is None:
-            return 0.0
-        q, v = system.q.x.array, system.v.x.array
-        owned = len(system.root.weights)
-        force: Array = np.zeros(owned)
-        if self._by_mass:
-            force += system.sum_of(self._by_mass)[:owned]
-        if by_mode is not None:
-            force += by_mode.times(v[:owned])
-        return np.asarray(force @ system.root.carried(q))
 
 
 # --- of a linear theory ----------------------------------------------------------------------------------------------

@@ -26,8 +26,7 @@ from rotfem.mechanics.unbalance import Unbalance
 from rotfem.mechanics.work import Frame, Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
-from rotfem.registry import resolved
-from rotfem.structures import build
+from rotfem.registry import resolved, structures
 from rotfem.structures.structure import Array, Structure
 from rotfem.users_functions import called
 
@@ -97,7 +96,7 @@ class Model:
         if moving and self.hub is not None:
             self.problem = problem = problem.pushed(self.motion)
             self.reacting = problem.unbalances
-        self.structure: Structure = build(problem, comm)
+        self.structure: Structure = resolved(structures[problem.structure.type].discretised)(problem, comm)
         fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
         self.frame = Frame(
             self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching, problem.frame == "fixed"
@@ -105,8 +104,9 @@ class Model:
         self.switches: dict[str, fem.Constant] = {}
         self._switched_off: frozenset[str] = frozenset()
         chosen = [Effect.registry[name] for name in self.effects]
-        if problem.frame == "fixed":  # internal damping turns with the shaft, and feeds its whirl
-            chosen = [replace(e, constants=None, passive=False) if e.name == "damping" else e for e in chosen]
+        # In the other frame the forces of dampers are products of their constants and the speed.
+        moved = ("damping", "coupling_dampers") if problem.frame == "fixed" else ("support_dampers",)
+        chosen = [replace(effect, constants=None) if effect.name in moved else effect for effect in chosen]
         if pitching:  # springs of axes that the frame turns about
             chosen = [replace(effect, constants=None) if effect.at_root else effect for effect in chosen]
         further = [Effect(name, term) for name, term in problem.terms.items()]
@@ -200,11 +200,7 @@ class Model:
     ) -> Both:
         """Return derived forms of the residual; they are kept by its signature, and reused on other meshes.
 
-        Args:
-            purpose: what they depend on in addition to the residual.
-            make: name ↦ UFL form.
-            more: constants and functions in them that are not in the residual.
-            once: see `rotfem.numerics.forms.form`.
+        `purpose` says what they depend on besides; `more` has constants and functions that are not in the residual.
         """
         residual = self.residual
         constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
@@ -275,16 +271,6 @@ class Model:
         if others:
             out.append(work.loads(replace(self.mechanics, loads=others), Variation(self.structure.k)))
         return out
-
-    @cached_property
-    def closed(self) -> bool:
-        """Whether nothing adds energy to the structure: its Jacobi integral is constant, or falls by damping."""
-        motion, turning = self.motion, self.problem.gravity_turns
-        steady = all(load.is_zero or load.constant for load in self.problem.loads.named.values())
-        dead = all(load.dead and load.conservative for load in self.mechanics.loads)
-        known = all(e.work is None or e.momentum or e.passive or e.potential is not None for e in self.acting.values())
-        sprung = self.fixed and bool(self.structure.hinges)  # the hub turns their springs
-        return motion.hub is None and motion.constant and not (turning or sprung) and steady and dead and known
 
     def outputs(self) -> dict[str, Any]:
         """Return name ↦ UFL form of the outputs."""

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -28,15 +29,18 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
+from ufl.algorithms import expand_derivatives
 
-from rotfem.equations.clamp import ClampWork, TurningClamp
+from rotfem.equations.clamp import TurningClamp
 from rotfem.equations.hub import BySpin
+from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.system import Instant, System, per_composition
+from rotfem.mechanics import work
 from rotfem.mechanics.effects import INTERNAL
-from rotfem.mechanics.work import Mechanics
+from rotfem.mechanics.work import Mechanics, Variation
 from rotfem.numerics import compat, forms
-from rotfem.numerics.forms import SAME_PATTERN, Assembler, assembled, weighted
-from rotfem.numerics.projection import summed
+from rotfem.numerics.forms import SAME_PATTERN, Assembler, added, assembled, weighted
+from rotfem.numerics.projection import summed, times, times_transposed
 
 Array = npt.NDArray[np.float64]
 
@@ -288,6 +292,98 @@ class NonlinearSystem(System):
         return assembled(self._spin, self.V, self.clamped, self._spun)
 
 
+# --- at the clamp -----------------------------------------------------------------------------------------------------
+
+
+class ClampWork:
+    """The constraint forces of the clamp, as work in the unit motions."""
+
+    def __init__(self, system: NonlinearSystem):
+        self._system, weights = system, system.root.weights
+        fixed = np.zeros((len(weights), 1), dtype=bool)
+        fixed[system.clamped] = True
+        self._motions: Array = weights[system.clamped]
+        self._fixed, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
+
+    def __call__(self, residual: Array) -> Array:
+        """Return this process's part of their work at the state set, (motions,), of F with its clamped rows."""
+        system = self._system
+        reaction = np.asarray(residual[system.clamped] @ self._motions) - self._damping()
+        if not self._springs:
+            return reaction
+        forces = system.sum_of(self._springs)[: len(self._turns)]
+        return np.asarray(reaction - forces @ self._turns)  # springs act against the turns of hinges
+
+    @cached_property
+    def _springs(self) -> list[Any]:
+        """The work of springs and dampers of the root, compiled; empty without any."""
+        terms = self._terms
+        return [forms.form(added(terms), once=True)] if terms else []
+
+    @property
+    def _terms(self) -> list[Any]:
+        model = self._system.model
+        terms = [term for name, term in model.terms.items() if model.acting[name].at_root]
+        return [term for term in terms if not expand_derivatives(term).empty()]  # of turns that are left out
+
+    def tangents(self) -> tuple[Array, Array, Array]:
+        """Return the derivatives of these forces to q, v and a about an equilibrium, (unknowns, motions) each."""
+        system = self._system
+        wholes = {kind: system.whole(kind) for kind in "KCM"}
+        K, C, M = (self._rows_times(wholes[kind], self._fixed) for kind in "KCM")
+        if self._springs:
+            du, terms = ufl.TrialFunction(system.V), added(self._terms)
+            for part, x in ((K, system.q), (C, system.v)):
+                slope = forms.form(ufl.derivative(terms, x, du), once=True)
+                part -= self._rows_times(system.whole_of([slope]), self._turns)
+        return K, C - self._damping_tangent(wholes["M"]), M
+
+    @staticmethod
+    def _rows_times(A: Any, columns: Array) -> Array:
+        """Return Aᵀ times columns; zero of None."""
+        return np.zeros_like(columns) if A is None else times_transposed(A, columns)
+
+    # --- forces between the hub and all of the structure ----------------------------------------------------------
+
+    @cached_property
+    def _by_mass(self) -> list[Any]:
+        """The work of a0 M v, compiled; empty without."""
+        model = self._system.model
+        m = model.mechanics
+        if EFFECT not in model.effects or m.damping.mass is None:
+            return []
+        alone = replace(m, damping=replace(m.damping, stiffness=None))
+        return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
+
+    def _damping_tangent(self, M: Any) -> Array | float:
+        """Return their derivatives to velocities, (owned unknowns, motions), of M with the rows of the clamp."""
+        system, by_mode = self._system, self._system.by_mode
+        mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
+        if mass is None and by_mode is None:
+            return 0.0
+        rigid = system.root.carried(system.q.x.array)
+        out: Array = np.zeros_like(rigid)
+        if mass is not None:
+            out += float(mass.value) * times(M, rigid)
+        if by_mode is not None:
+            out += by_mode.times(rigid)
+        return out
+
+    def _damping(self) -> Array | float:
+        """Return this process's part of the work of the damping forces at the state set, (motions,); 0 without."""
+        system, by_mode = self._system, self._system.by_mode
+        if not self._by_mass and by_mode is None:
+            return 0.0
+        q, v = system.q.x.array, system.v.x.array
+        owned = len(system.root.weights)
+        force: Array = np.zeros(owned)
+        if self._by_mass:
+            force += system.sum_of(self._by_mass)[:owned]
+        if by_mode is not None:
+            force += by_mode.times(v[:owned])
+        return np.asarray(force @ system.root.carried(q))
+
+
 # --- over a whole step ------------------------------------------------------------------------------------------------
 
 
@@ -373,16 +469,15 @@ class EnergyBalance:
         if self.model.hub is not None:
             return
         _ = self._N
-        energy, self._due = memory or (None, 0.0)
-        self._H_0 = self._H(self._q_0, self._v_0) if energy is None or not self.model.closed else energy
+        self._due = memory or 0.0
+        self._H_0 = self._H(self._q_0, self._v_0)
 
-    def finish(self) -> tuple[float, float] | None:
-        """Return the energy at the end of the solved step and the defect of its balance, for the next one (J)."""
+    def finish(self) -> float | None:
+        """Return the defect of the energy's balance of the solved step (J), for the next one."""
         if self.model.hub is not None:
             return None
         work = self._work_done()
-        H_1 = self._H(self._end.x.array, 2 * self._middle[1] - self._v_0)
-        return H_1, self._due + self._H_0 + work - H_1
+        return self._due + self._H_0 + work - self._H(self._end.x.array, 2 * self._middle[1] - self._v_0)
 
     def prescribe(self, clamp: TurningClamp, q: Array, v: Array, a: Array) -> None:
         """Write the motion of the clamp so that it is exact at the end of the step."""

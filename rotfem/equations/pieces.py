@@ -406,11 +406,12 @@ class Pieces:
         """Return the `material` without what these effects add to the strains."""
         parts = [p for p in self.all if p.kind == "K" and "internal" in p.of and PRESTRESS not in p.of]
         K, *others = [p.operator for p in parts if p.of.isdisjoint(without)]
-        if others or self.structure.released:
+        loose = bool(self.structure.released or self.structure.extra)  # held by other than strains
+        if others or loose:
             K = K.copy()
         for other in others:
             K.axpy(1.0, other, SAME_PATTERN)
-        if self.structure.released:
+        if loose:
             restrained(K, self._hinged)
         return K
 

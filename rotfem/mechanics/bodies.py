@@ -137,14 +137,15 @@ def _half(a: Any, b: Any, sign: int = 1) -> Any:
 
 @dataclass(frozen=True)
 class Support(Moved):
-    """A spring and a damper across the axis of a beam, in the frame: forces −K x − D ẋ, or moments of turns x.
+    """A spring and a damper of a beam, in the frame: forces −K x − D ẋ, or moments of turns x.
 
     Attributes:
-        x: displacement (m) or turn (rad) across the axis as an expression of q, components along directions 2 and 3.
+        x: displacement (m) or turn (rad) as an expression of q, components along directions 2 and 3 across the axis.
         stiffness: K, rows of two (N/m, N·m/rad), constants or 0.
         damping: D likewise (N·s/m, N·m·s/rad).
         measure: UFL measure of its place.
-        at_rest: whether it stands in the fixed frame, also where the frame rotates.
+        at_rest: whether it stands in the fixed frame, also where the frame rotates; else it turns with the hub.
+        across: whether x is across the axis; that of a coupling may be the stretch and the twist along it.
     """
 
     x: Any
@@ -152,6 +153,7 @@ class Support(Moved):
     damping: Any
     measure: Any
     at_rest: bool = True
+    across: bool = True
 
     def rigid_turn(self, e: Any) -> Any:
         """Return e×x of a support in the fixed frame; nothing of one that turns with the hub."""

@@ -40,7 +40,6 @@ class Effect:
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
             impulse that hub and structure are given.
-        passive: whether its forces store or dissipate energy, and never add any.
         at_root: whether its forces act between the hub and the root only.
         kinetic: its part of the kinetic energy, "T1" or "T0".
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
@@ -56,7 +55,6 @@ class Effect:
     of_rotation: bool = False
     internal: bool = False
     momentum: bool = False
-    passive: bool = False
     at_root: bool = False
     kinetic: str = ""
     potential: Potential | None = None
@@ -100,6 +98,11 @@ def supports_of(problem: Any) -> Any:
     return getattr(problem.structure, "supports", ())
 
 
+def couplings_of(problem: Any) -> Any:
+    """Return the couplings of a problem's structure."""
+    return getattr(problem.structure, "couplings", ())
+
+
 def pitches(problem: Any) -> bool:
     """Return whether the frame of a problem turns with a pitch over time too."""
     return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
@@ -116,13 +119,13 @@ def moves_origin(problem: Any) -> bool:
 
 
 # What every model has.
-INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True, passive=True)
+INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True)
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
 LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("potential_of_loads"))
 
 _SPINS = ("the structure spins", "nothing spins")
 _OF_ROTATION: dict[str, Any] = {"of_rotation": True, "momentum": True}
-_AT_ROOT: dict[str, Any] = {"constants": (), "internal": True, "passive": True, "at_root": True}
+_AT_ROOT: dict[str, Any] = {"constants": (), "internal": True, "at_root": True}
 
 for _effect in (
     Effect("coriolis", _work("coriolis"), turns, _SPINS, ("w",), kinetic="T1", **_OF_ROTATION),
@@ -163,7 +166,6 @@ for _effect in (
         ("there is a damping coefficient", "no damping"),
         (),
         internal=True,
-        passive=True,
     ),
     Effect(
         "root_springs",
@@ -186,7 +188,6 @@ for _effect in (
         lambda problem: bool(supports_of(problem)),
         ("a shaft has supports", "no supports"),
         ("supports",),
-        passive=True,
         potential=_work("potential_of_supports"),
     ),
     Effect(
@@ -195,6 +196,23 @@ for _effect in (
         lambda problem: any(s.feeds for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
         ("supports",),
+    ),
+    Effect(
+        "couplings",
+        _work("couplings"),
+        lambda problem: bool(couplings_of(problem)),
+        ("the beam has couplings", "no couplings"),
+        ("supports",),
+        internal=True,
+        potential=_work("potential_of_couplings"),
+    ),
+    Effect(
+        "coupling_dampers",
+        _work("coupling_dampers"),
+        lambda problem: any(c.feeds for c in couplings_of(problem)),
+        ("couplings have dampers", "couplings have no dampers"),
+        ("supports",),
+        internal=True,
     ),
     Effect(
         "trapeze",

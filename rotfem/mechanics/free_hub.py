@@ -159,12 +159,7 @@ class FreeHub:
             object.__setattr__(self, name, si(getattr(self, name), unit, f"motion.{name}"))
 
     def rigid_speeds(self, times: Array, inertia: float) -> Array:
-        """Return the speed (n,), rad/s, at times (n,), s, as if the structure were rigid.
-
-        Args:
-            times: increasing, the first the start; the torque is taken in the middle between two.
-            inertia: of hub and structure about the axis, kg·m².
-        """
+        """Return the speed (n,), rad/s, at times (n,), s, from the start on, of a rigid hub of all inertia, kg·m²."""
         h, middle = np.diff(times), 0.5 * (times[:-1] + times[1:])
         given = None if self.torque.controlled else self.torque.many(middle)
         speeds, decay, psi = np.full(len(times), self.speed), self.damping / inertia, 0.0

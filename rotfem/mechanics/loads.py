@@ -279,9 +279,9 @@ def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float
     """Return one load, or another signal."""
     planar = structure.is_planar
     size = 1 if key == "loads.pressure" or (planar and is_moment(key)) else 3
-    over, value = given.over
-    if "x" in over and callable(value):
-        timed = "t" in over
+    name, value = given.given
+    timed = name.endswith("time")
+    if "span" in name and callable(value):
         function = checked(value, key, size, "place and time" if timed else "place", planar)
         at = function if timed else (lambda x, t: function(x))
         # Places along the structure, of a plate from a file one, that show how the load changes with time.
@@ -293,10 +293,10 @@ def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float
         of_time = checked(value, key, size, "time", planar)
         each = Shapes.uniform(np.eye(size))
         terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
-    elif over == ("t",):
+    elif name == "over_time":
         terms.append(Term.table(value, Shapes.uniform(np.eye(len(value[0]) - 1))))
-    elif over:
-        terms.append(Term(Shapes.along_span(value)) if over == ("x",) else Term.both(value))
+    elif "span" in name:
+        terms.append(Term.both(value) if timed else Term(Shapes.along_span(value)))
     elif isinstance(value, dict):
         terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in value.items()]
     elif value is not None:

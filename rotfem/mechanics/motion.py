@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import FreeHub
+from rotfem.mechanics.loads import Load
 from rotfem.mechanics.pitch import Pitch, turn_about
 from rotfem.registry import Registry
 from rotfem.registry import motion_laws as registered
@@ -55,11 +56,6 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 
-def no_acceleration(t: float) -> Array:
-    """Return a_o = 0."""
-    return np.zeros(3)
-
-
 def about(axis: npt.ArrayLike) -> Array:
     """Return the unit vector along an axis of any length, shape (3,)."""
     e = np.asarray(axis, dtype=float)
@@ -75,17 +71,15 @@ class Motion:
         rate: dOmega/dt(t) in rad/s^2.
         angle: psi(t) = integral of Omega from 0, in rad.
         axis: unit vector e, frame components.
-        base_acceleration: a_o(t), shape (3,), frame components, m/s^2.
-        constant: whether Omega and a_o do not change with time.
+        base: a_o(t), frame components, m/s^2, as a sum; None: 0.
         is_spinning: whether Omega is anything but zero, as far as is known.
         changes_speed: whether Omega changes, as far as is known.
-        is_accelerated: whether a_o is anything but zero.
         knots: times (s) between which Omega is smooth and nearly a polynomial.
-        sharp: those of them at which a derivative of it may jump.
+        sharp: those of them at which it may jump or have a kink.
+        bent: those of them at which its rate has a kink.
         breakpoints: of a function, those that its user named; None if they are searched.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
-        base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
         pitch: turn of the frame in addition to that of the hub (see `rotfem.mechanics.pitch`); None: the frame is the
@@ -96,17 +90,15 @@ class Motion:
     rate: Scalar
     angle: Scalar
     axis: Array
-    base_acceleration: Callable[[float], Array] = no_acceleration
-    constant: bool = False
+    base: Load | None = None
     is_spinning: bool = True
     changes_speed: bool = True
-    is_accelerated: bool = False
     knots: tuple[float, ...] = ()
     sharp: tuple[float, ...] = ()
+    bent: tuple[float, ...] = ()
     breakpoints: tuple[float, ...] | None = None
     smooth: bool = True
     arrays: bool = False
-    base_knots: tuple[float, ...] | None = None
     settled: float = 0.0
     hub: FreeHub | None = None
     pitch: Pitch | None = None
@@ -117,7 +109,7 @@ class Motion:
         """Return steady rotation at a speed (rad/s, or as "12.1 rpm")."""
         speed = si(speed, "rad/s", "motion.speed")
         turning = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
-        state: dict[str, Any] = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
+        state: dict[str, Any] = {"is_spinning": speed != 0.0, "changes_speed": False}
         return cls(*turning, about(axis), **(state | more))
 
     @classmethod
@@ -140,6 +132,7 @@ class Motion:
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
             "sharp": (t[0], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
+            "bent": tuple(t) if kind == "pchip" else (),
             "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))
@@ -177,8 +170,23 @@ class Motion:
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the rotation of a free hub, an unknown; what is prescribed of it is its initial speed."""
-        state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
+        state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "hub": hub}
         return replace(cls.constant_speed(hub.speed, axis), **(state | more))
+
+    @property
+    def constant(self) -> bool:
+        """Whether neither Omega nor a_o nor the pitch changes with time."""
+        turns = self.changes_speed or (self.pitch is not None and self.pitch.changes)
+        return not turns and (self.base is None or self.base.constant)
+
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether a_o is anything but zero."""
+        return self.base is not None and not self.base.is_zero
+
+    def base_acceleration(self, t: float) -> Array:
+        """Return a_o(t), shape (3,), frame components, m/s²."""
+        return np.zeros(3) if self.base is None else self.base.at(t)
 
     def frame(self, t: float) -> dict[str, Array]:
         """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
@@ -198,12 +206,12 @@ class Motion:
 
     def at_speed(self, omega: float) -> Motion:
         """Return the same frame spinning at the constant speed omega (rad/s), its pitch that of t = 0."""
-        still = Motion.constant_speed(omega, self.axis, pitch=None if self.pitch is None else self.pitch.held())
-        return replace(still, base_acceleration=self.base_acceleration, is_accelerated=self.is_accelerated)
+        pitch = None if self.pitch is None else self.pitch.held()
+        return Motion.constant_speed(omega, self.axis, pitch=pitch, base=self.base)
 
     def pitched(self, pitch: Pitch) -> Motion:
         """Return the motion of a frame that pitches over time too."""
-        return replace(self, pitch=pitch, constant=False)
+        return replace(self, pitch=pitch)
 
     def top_speed(self, end: float | None) -> float:
         """Return the largest |Omega| (rad/s) at knots until a time (s), or ever; 0 of a function and of a free hub."""

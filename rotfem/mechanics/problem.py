@@ -56,7 +56,7 @@ class Problem:
         mesh: elements, degree and integration.
         theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
-        loads: gravity and applied loads, as sums.
+        loads: gravity and applied loads, as sums; may be given as [loads] of a scene (`rotfem.Loads` of a script).
         frame: "rotating"; "fixed", the frame of a round shaft that spins about its own axis; or "inertial" (translates
             with the hub, does not rotate). "auto" becomes "fixed" for such a shaft, else "rotating".
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
@@ -80,6 +80,10 @@ class Problem:
     __repr__ = short_fields
 
     def __post_init__(self) -> None:
+        given: Any = self.loads
+        if not isinstance(given, Loads):
+            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
+            object.__setattr__(self, "loads", made)
         if isinstance(self.theory, str):
             if self.theory not in Theory.registry:
                 raise InputError("model.theory", self.theory, f"allowed: {', '.join(Theory.registry.names)}")
@@ -88,8 +92,7 @@ class Problem:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         object.__setattr__(self, "mesh", self.mesh.suited(self.structure))
         if not self.theory.holds_for(self.structure.type):
-            kinds = ", ".join(self.theory.strains)
-            why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
+            why = f"has strains for {', '.join(self.theory.strains)}, none for a {self.structure.type}"
             raise InputError("model.theory", self.theory.name, why)
         if self.frame == "auto":
             object.__setattr__(self, "frame", "fixed" if self.is_shaft else "rotating")
@@ -105,8 +108,14 @@ class Problem:
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
         if self.frame == "inertial" and not flat_and_exact:
-            why = "needs a planar_beam, a theory that holds for any displacement, and a prescribed rotation"
+            exact = " or ".join(theory.name for theory in Theory.registry if theory.exact)
+            why = f"needs a planar_beam, a theory that holds for any displacement ({exact}), and a prescribed rotation"
             raise InputError("model.frame", self.frame, why)
+        if self.frame == "inertial" and (self.structure.damping.mass_rate or self.structure.damping.has_modal):
+            why = "by mass would brake the revolution itself in the inertial frame, and modes at rest turn there"
+            raise InputError("structure.damping", None, f'{why}; use model.frame = "rotating"')
+        if self.motion.hub is not None and getattr(self.structure, "pitches", False):
+            raise InputError("structure.root.pitch", None, "over time needs a speed that is prescribed, no torque")
         if self.prestress not in (None, "axial", "all"):
             raise InputError("model.prestress", self.prestress, "allowed: axial, all")
         for name in self.terms:
@@ -229,7 +238,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     """Return in which directions (3,) polar and axial vectors may drive a problem at any time, frame components."""
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
-    polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
+    polar = (_of_load(motion.base) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
     axial = (np.asarray(motion.axis) != 0.0) & moved
     for name, load in loads.named.items():
         which = _of_load(load) != 0.0
@@ -237,21 +246,11 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     return polar, axial
 
 
-def _of_load(load: Load) -> Array:
+def _of_load(load: Load | None) -> Array:
     """Return the largest size of each component of a load over all times, shape (3,); infinite where it is unknown."""
-    values = np.zeros(3) if load.is_zero else load.sizes()
+    values = np.zeros(3) if load is None or load.is_zero else load.sizes()
     if values is None:
         return np.full(3, np.inf)
     if len(values) == 1:  # about axis 3, or along it
         return np.array([0.0, 0.0, values[0]])
     return np.concatenate([values, np.zeros(3 - len(values))])
-
-
-def _of_base(motion: Any) -> Array:
-    """Return the same of the base acceleration, which is linear between its knots."""
-    if not motion.is_accelerated:
-        return np.zeros(3)
-    times = (0.0,) if motion.constant else motion.base_knots
-    if times is None:
-        return np.full(3, np.inf)
-    return np.asarray(np.abs([motion.base_acceleration(t) for t in (0.0, *times)]).max(axis=0))

@@ -76,6 +76,7 @@ class TimeSignal:
         at: time (s) ↦ value, scalar or shape (components,).
         knots: times (s) at which it or its rate may jump, increasing.
         smooth: further times (s) between which it is a polynomial, or nearly one.
+        bent: those of them at which its rate has a kink, which takes two orders from an adaptive step over it.
         many: the same of an array of times, shape (n, components); made of `at` if None.
         known: whether all knots are known; else jumps are searched.
         continuous: whether it must not jump, as speeds and angles.
@@ -86,6 +87,7 @@ class TimeSignal:
     at: Callable[[float], Any]
     knots: Array
     smooth: Array = field(default_factory=lambda: np.empty(0))
+    bent: Array = field(default_factory=lambda: np.empty(0))
     many: Callable[[Array], Array] | None = None
     known: bool = True
     continuous: bool = False
@@ -180,17 +182,15 @@ def _viewed_load(name: str, load: Load, see: Callable[..., TimeSignal]) -> Load:
 def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
     """Return a motion, evaluated as a view says; speed, pitch and its rate must not jump."""
     changes: dict[str, Any] = {}
-    if motion.is_accelerated and not motion.constant:
-        base, at = motion.base_knots, motion.base_acceleration
-        changes["base_acceleration"] = see(
-            "motion.base_acceleration", at, base, many=_between(at, base), known=base is not None
-        ).seen
+    if motion.base is not None and not motion.base.constant:
+        changes["base"] = _viewed_load("motion.base_acceleration", motion.base, see)
     if motion.hub is not None:
         if len((torque := motion.hub.torque).knots):
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
             changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:
-        more = {"smooth": np.array(motion.knots), "known": motion.smooth or motion.breakpoints is not None}
+        more: dict[str, Any] = {"smooth": np.array(motion.knots), "bent": np.array(motion.bent)}
+        more |= {"known": motion.smooth or motion.breakpoints is not None}
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
             signal = see(f"motion.{name}", f, motion.sharp, many=many, continuous=name == "speed", **more)
@@ -201,11 +201,3 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
             turned[name] = see(key, f, pitch.knots, known=pitch.known, continuous=name != "acceleration").seen
         changes["pitch"] = replace(pitch, **turned)
     return replace(motion, **changes)
-
-
-def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:
-    """Return a signal of an array of times that is linear between knots; None where it is not, or jumps there."""
-    if not knots or np.any(np.diff(knots) <= 0.0):
-        return None
-    columns = np.array([at(t) for t in knots], dtype=float).T
-    return lambda t: np.stack([np.interp(t, knots, column) for column in columns], axis=1)

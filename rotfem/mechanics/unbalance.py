@@ -65,8 +65,7 @@ class Unbalance:
 
 def unbalances(structure: Any, given: Sequence[Any] = ()) -> tuple[Unbalance, ...]:
     """Return the unbalances of a shaft: of its masses off the axis, and of a scene's table."""
-    masses = [(m.x, m.mass, m.offset) for m in getattr(structure, "masses", ())]
-    masses.append((structure.length, structure.tip_mass, getattr(structure, "tip_offset", (0.0, 0.0, 0.0))))
+    masses = [(m.x, m.mass, m.offset) for m in structure.bodies.values()]
     own = [Unbalance(x, mass * hypot(y, z), atan2(z, y)) for x, mass, (_, y, z) in masses if mass * hypot(y, z) > 0]
     return (*own, *(Unbalance(u.x, u.moment, u.phase, u.start) for u in given))
 

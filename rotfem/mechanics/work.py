@@ -349,21 +349,34 @@ def _product(rows: Any, x: Any, delta: Any) -> Any:
     return added(a * x[j] * delta[i] for i, row in enumerate(rows) for j, a in enumerate(row) if not isinstance(a, int))
 
 
-def supports(m: Mechanics, delta: Any) -> Any:
-    """Return Σ K x·δx of displacements or turns x of a beam in its supports, K the symmetric part of stiffness."""
-    return added(_product(s.symmetric(), s.x, delta.of(s)) * s.measure for s in m.structure.supports(m.frame))
+def _springs_of(kind: str) -> Callable[[Mechanics, Any], Any]:
+    """Return Σ K x·δx of displacements or turns x in supports or couplings, K the symmetric part of their stiffness."""
+
+    def work(m: Mechanics, delta: Any) -> Any:
+        found = getattr(m.structure, kind)(m.frame)
+        return added(_product(s.symmetric(), s.x, delta.of(s)) * s.measure for s in found)
+
+    return work
 
 
-def support_dampers(m: Mechanics, delta: Any) -> Any:
-    """Return Σ (D ẋ + K x)·δx, K the skew part of stiffness, ẋ in the frame that supports stand in."""
-    work = []
-    for s in m.structure.supports(m.frame):
-        rate, omega = m.k.rate(s.x), m.frame.w[0] if s.at_rest and not m.frame.spun else 0
-        if not isinstance(omega, int):
-            rate += omega * ufl.as_vector((-s.x[1], s.x[0]))
-        for rows, x in ((s.damping, rate), (s.skew(), s.x)):
-            work.append(_product(rows, x, delta.of(s)) * s.measure)
-    return added(w for w in work if not isinstance(w, int))
+def _dampers_of(kind: str) -> Callable[[Mechanics, Any], Any]:
+    """Return Σ (D ẋ + K x)·δx, K the skew part of stiffness, ẋ seen from what the supports or couplings stand in."""
+
+    def work(m: Mechanics, delta: Any) -> Any:
+        work = []
+        for s in getattr(m.structure, kind)(m.frame):
+            rate = m.k.rate(s.x)
+            if s.across and s.at_rest != m.frame.spun:  # what it stands in turns in the frame
+                rate += (m.frame.w[0] if s.at_rest else -m.frame.w[0]) * ufl.as_vector((-s.x[1], s.x[0]))
+            for rows, x in ((s.damping, rate), (s.skew(), s.x)):
+                work.append(_product(rows, x, delta.of(s)) * s.measure)
+        return added(w for w in work if not isinstance(w, int))
+
+    return work
+
+
+supports, support_dampers = _springs_of("supports"), _dampers_of("supports")
+couplings, coupling_dampers = _springs_of("couplings"), _dampers_of("couplings")
 
 
 def loads(m: Mechanics, delta: Any) -> Any:
@@ -417,6 +430,7 @@ potential_of_base = _potential_of(base, 1.0)
 potential_of_gravity = _potential_of(gravity, 1.0)
 potential_of_root_springs = _potential_of(root_springs, 0.5)
 potential_of_supports = _potential_of(supports, 0.5)
+potential_of_couplings = _potential_of(couplings, 0.5)
 
 
 def potential_of_loads(m: Mechanics) -> Any:

@@ -215,6 +215,11 @@ class Eigenpairs:
         """λ, shape (m,); zero where it is so to round-off."""
         return np.where(self.bounds < 1.0, self.values, 0.0)
 
+    @property
+    def overdamped(self) -> Array:
+        """Which of them do not vibrate but die away, shape (m,)."""
+        return np.asarray((self.values.imag == 0.0) & (self.values.real < 0.0) & (self.bounds < 1.0))
+
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
         vectors = self.right[:, index], self.left[:, index]
@@ -302,9 +307,11 @@ class Pencil:
     Attributes:
         owner: kept alive with the matrices.
         factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
+        overdamped: number of overdamped pairs that are expected among others of a shaft; None of other structures.
     """
 
     factor: DirectSolver | None = None
+    overdamped: int | None = None
 
     def __init__(self, M: Any, C: Any, K: Any):
         self.M, self.C, self.K = M, C, K
@@ -375,6 +382,17 @@ class Pencil:
         lam = pairs.values
         opposite = np.abs(lam[1:] + lam[:-1]) < ZERO_EIGENVALUE * np.abs(lam[1:])
         return pairs.select(np.flatnonzero(np.append(True, ~opposite | (pairs.bounds[1:] < 1.0))[: len(lam)]))
+
+    def first(self, count: int, target: float = 0.0) -> Eigenpairs:
+        """Return pairs as `solve` does; of a shaft `count` of them are not overdamped, and those that are come last."""
+        if self.overdamped is None:
+            return self.solve(count, target)
+        pairs = self.solve(count + self.overdamped, target)
+        with suppress(ComputationError):  # where further ones are inaccurate, there are no more
+            while (over := int(np.sum(pairs.overdamped))) > self.overdamped:
+                pairs = self.solve(count + over, target)
+                self.overdamped = over
+        return pairs.select(np.argsort(pairs.overdamped, kind="stable"))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
         if sparse_part(self.C) is not self.C:  # SLEPc's solver takes sparse matrices alone

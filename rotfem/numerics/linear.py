@@ -49,7 +49,7 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
 def restrained(K: Any, numbers: npt.NDArray[Any]) -> None:
     """Hold unknowns of these numbers in a stiffness matrix, by springs as stiff as it is there."""
     d = K.getDiagonal()
-    d.array[numbers] *= 2.0
+    d.array[numbers] = np.where(d.array[numbers] == 0.0, 1.0, 2.0 * d.array[numbers])
     K.setDiagonal(d)
 
 

@@ -21,9 +21,9 @@ class CriticalSpeed:
         kind: "forward" of a rotor's whirl that an unbalance excites; "backward" of whirl against the spin at its speed,
             or a wave of a disk that stands still in the fixed frame; "per_rev" of any other one.
         order: 1 of whirl, nodal diameters of a disk's wave, k of "per_rev".
-        branch: number of the branch, from 1 on.
-        per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
-        frequency: of the branch there, in the rotating frame, kΩ, rad/s.
+        branch: number of the branch, from 1 on; 0 of a whirl that is none of the branches.
+        per_rev: k, the frequency in the frame of the diagram over the speed; 0 of forward whirl in the rotating one.
+        frequency: of the branch there, in the frame of the diagram, kΩ, rad/s.
         label: of the branch.
     """
 
@@ -62,14 +62,14 @@ class CampbellResult(Rows):
             `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
             asked for); of a shaft or a disk `turning` (1 for a wave that runs with the spin in the rotor, −1 against
             it, 0 for a standing one), `whirl` ("forward", "backward" or "standing") and `frequency_fixed` (rad/s, in
-            the fixed frame).
+            the fixed frame). A shaft has `log_decrement` δ = −2π Re λ/|Im λ|, None of what does not vibrate; in the
+            rotating frame it has `frequency_fixed_2` of its smaller wave, too: both are |ω ± Ω|.
     """
 
     index = ("speed", "label")
     frequencies = OfTable(
         "frequency",
-        "Frequencies in the rotating frame, (speeds, branches), rad/s; NaN where a branch is lost. With supports that "
-        "differ by direction they are those in the fixed frame.",
+        "Frequencies in the `frame`, (speeds, branches), rad/s; NaN where a branch is lost.",
     )
     damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (speeds, branches); NaN where a branch is lost.")
     growth = OfTable("growth", "Growth Re λ, (speeds, branches), 1/s; NaN where a branch is lost.")
@@ -115,12 +115,14 @@ class CampbellResult(Rows):
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
             **super().texts(),
-            "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
+            "campbell.json": json_text(
+                {"frame": self.frame, **{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}
+            ),
         }
 
     def drawn(self) -> dict[str, str]:
         """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
-        both = self.summary.get("frame") != "fixed" and "whirl" in self.rows[0]
+        both = self.frame != "fixed" and "whirl" in self.rows[0]
         fixed = {"campbell_fixed.png": "results.plots_campbell:fixed_figure"}
         return {"campbell.png": "results.plots_campbell:campbell_figure", **(fixed if both else {})}
 
@@ -141,7 +143,7 @@ class CampbellResult(Rows):
             [f"{b['confidence']:.3f}" for b in branches],
         ]
         first, last = (f"{units.frequency} at {number(float(units.speeds(x)))} {units.speed}" for x in ends)
-        head = ("branch", "name", first, last, "MAC (–)")
+        head = ("branch", "name", f"{self.frame} frame: {first}", last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
             what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"

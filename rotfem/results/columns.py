@@ -81,16 +81,18 @@ COLUMNS = {
     "angle": ("angle of the larger semi-axis from direction 2", "rad"),
     "probe": ("amplitude that a probe reads", "m"),
     **{f"f{i}": (f"force of the shaft on a support, f{_SUB[i]}", "N") for i in "23"},
-    "frequency": ("frequency in the rotating frame", "rad/s"),
-    "frequency_hz": ("frequency in the rotating frame", "Hz"),
+    "frequency": ("frequency", "rad/s"),
+    "frequency_hz": ("frequency", "Hz"),
     "damping": ("damping ratio", "1"),
+    "log_decrement": ("logarithmic decrement", "1"),
     "growth": ("growth", "1/s"),
     "residual": ("backward error", "1"),
     "mesh_error": ("relative error that the mesh may cause", "1"),
     "error_bound": ("relative error that round-off may cause", "1"),
     "confidence": ("squared correlation with the speed before", "1"),
     "turning": ("wave with the spin (1) or against it (−1)", "1"),
-    "frequency_fixed": ("frequency in the fixed frame", "rad/s"),
+    "frequency_fixed": ("frequency, fixed frame", "rad/s"),
+    "frequency_fixed_2": ("frequency of the smaller wave, fixed frame", "rad/s"),
     "estimate": ("estimated relative change", "1"),
     "truth": ("relative change of the full models", "1"),
     "worst": ("largest estimated relative change", "1"),
@@ -130,9 +132,9 @@ def described(column: str) -> tuple[str, str]:
     return column, ""
 
 
-def label(column: str, shown: str = "") -> str:
-    """Return the axis label of a column, with its unit, or with the one that it is shown in."""
-    return f"{described(column)[0]} {shown_unit(column, shown)}".rstrip()
+def label(column: str, shown: str = "", frame: str = "") -> str:
+    """Return the axis label of a column, with its unit, or with the one that it is shown in, and with its frame."""
+    return f"{described(column)[0]}{f', {frame} frame' * bool(frame)} {shown_unit(column, shown)}".rstrip()
 
 
 def label_of(name: str) -> str:
@@ -236,6 +238,7 @@ def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Datas
     out = out.set_coords([name for name in COORDINATES if name in out])
     for name, array in out.variables.items():
         what, unit = described(str(name))
+        what += f", {attributes['frame']} frame" * (name in ("frequency", "frequency_hz") and "frame" in attributes)
         array.attrs |= {"long_name": what, "units": unit} if unit else {}
     return out
 

@@ -82,7 +82,8 @@ class ModesResult(Rows):
     Attributes:
         summary: scene, speed, modes, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
-            (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error),
+            (1/s), `stability`, `share_…` (of the kinetic energy), of shafts and disks `log_decrement`, `whirl`,
+            `frequency_fixed`, … (see `rotfem.CampbellResult`), `residual` (backward error),
             `error_bound` (how far round-off can have moved the eigenvalue, relative to its size),
             `mesh_error` (how far the mesh is estimated to have put the frequency off, relative; with `output.error`).
         shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
@@ -107,8 +108,8 @@ class ModesResult(Rows):
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)
     index = ("mode",)
-    frequencies = OfTable("frequency", "Frequencies in the rotating frame, (modes,), rad/s; 0 of a rigid body.")
-    frequencies_hz = OfTable("frequency_hz", "Frequencies in the rotating frame, (modes,), Hz.")
+    frequencies = OfTable("frequency", "Frequencies in the `frame`, (modes,), rad/s; 0 of a rigid body.")
+    frequencies_hz = OfTable("frequency_hz", "Frequencies in the `frame`, (modes,), Hz.")
     damping = OfTable("damping", "Damping ratios −Re λ/|λ|, (modes,).")
     growth = OfTable("growth", "Growth Re λ of every mode, (modes,), 1/s; negative where it dies away.")
 
@@ -162,7 +163,7 @@ class ModesResult(Rows):
             InputError: tables over the span are wanted of a plate.
         """
         fitted = {"elastodyn_modes.dat": elastodyn_lines(self.mode_polynomials())} if self.blade_tables else {}
-        modes = json_text({"speed": self.summary["speed"], "modes": self.rows})
+        modes = json_text({"speed": self.summary["speed"], "frame": self.frame, "modes": self.rows})
         return {**super().texts(), **fitted, "modes.json": modes}
 
     def _over_span(self) -> Iterator[tuple[dict[str, Any], dict[str, Array]]]:
@@ -229,22 +230,34 @@ class ModesResult(Rows):
         return {"modes.png": f"results.plots:{draw}"} if self.shapes else {}
 
     def tables(self) -> list[ShortTable]:
-        """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency."""
+        """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency.
+
+        Shafts have a logarithmic decrement; those in the rotating frame both frequencies |ω ± Ω| in the fixed one.
+        """
         unit = ShownUnits.of(self.summary).frequency
         first = unit if unit != "Hz" else "rad/s"  # there is a column of Hz in any case
         rows = self.rows
         errors = [None if (e := row.get("mesh_error")) is None else e + row["error_bound"] for row in rows]
         errors = [e if row["stability"] != "unresolved" else None for e, row in zip(errors, rows, strict=True)]
-        columns = [
-            [str(row["mode"]) for row in rows],
-            [row["label"] for row in rows],
-            numbers([float(in_unit(row["frequency"], first)) for row in rows], 8),
-            numbers([row["frequency_hz"] for row in rows], 8),
-            [per_cent(row["damping"]) for row in rows],
-            list(map(per_cent, errors)),
-        ]
-        head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
-        return [ShortTable(head, list(zip(*columns, strict=True)))]
+
+        def shown(name: str) -> list[str]:
+            return numbers([float(in_unit(row[name], first)) for row in rows], 8)
+
+        columns = {
+            "mode": [str(row["mode"]) for row in rows],
+            "name": [row["label"] for row in rows],
+            f"{self.frame} frame ({first})": shown("frequency"),
+            "(Hz)": numbers([row["frequency_hz"] for row in rows], 8),
+        }
+        if any("frequency_fixed_2" in row for row in rows):
+            both = zip(shown("frequency_fixed"), shown("frequency_fixed_2"), strict=True)
+            columns[f"|ω ± Ω|, fixed frame ({first})"] = [", ".join(pair) for pair in both]
+        if any("log_decrement" in row for row in rows):
+            columns["log decrement (–)"] = [number(row["log_decrement"], 1.0, 4) for row in rows]
+        else:
+            columns["damping (%)"] = [per_cent(row["damping"]) for row in rows]
+        columns["error (%)"] = list(map(per_cent, errors))
+        return [ShortTable(tuple(columns), list(zip(*columns.values(), strict=True)))]
 
     def arrays(self) -> Variables:
         """Return the columns of modes.csv over `mode`, the speed (rad/s), and the shapes over `mode` and `node`.
@@ -301,4 +314,4 @@ class ResponseResult(Rows):
             (named(name), number(peak["amplitude"], scales[name]), f"{units.frequencies(peak['frequency']):.8g}")
             for name, peak in peaks.items()
         ]
-        return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
+        return [ShortTable((f"output, {self.frame} frame", "largest amplitude", f"at ({units.frequency})"), rows)]

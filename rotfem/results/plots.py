@@ -48,7 +48,7 @@ def dress(panel: Axes, x: str = "", y: str = "", size: float | None = 8) -> None
 
 def heading(result: Result) -> str:
     """Return the title of a figure of components: what was computed, and the frame whose axes they are along."""
-    return f"{result.title}, {result.summary.get('frame', 'rotating')} frame"
+    return f"{result.title}, {result.frame} frame"
 
 
 def panels_over(
@@ -200,7 +200,7 @@ def response_figure(result: ResponseResult) -> Figure:
     rows: dict[tuple[str, str], list[str]] = {}
     for name in shown:
         rows.setdefault((name.partition("_")[0], described(name)[1]), []).append(name)
-    across = f"frequency of the load ({units.frequency})"
+    across = f"frequency of the load, {result.frame} frame ({units.frequency})"
     figure, panels = panels_over(across, 2 * len(rows), title, columns=2, beside=1.1)
     x = units.frequencies(result.frequencies)
     mark = "." if len(x) == 1 else ""

@@ -30,7 +30,7 @@ class Branch:
     Attributes:
         name: of its mode.
         number: from 1 on, decides the colour.
-        speed, frequency, damping: over the speeds solved; damping ratios in per cent.
+        speed, frequency, damping: over the speeds solved; damping ratios in per cent, of shafts logarithmic decrements.
         doubtful: whether the step to a speed from the one before is ambiguous.
         unstable: whether the mode grows there.
     """
@@ -62,12 +62,12 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     last = max(0.0, *(float(b.speed[-1]) for b in branches))
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
-    damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
+    damped = any(np.nanmax(np.abs(b.damping), initial=0.0) > 0.0 for b in shown)
     figure = Figure()
     panels = figure.subplots(1 + damped, 1, sharex=True, squeeze=False)[:, 0]
     axis = panels[0]
-    seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
-    captions = [label(seen, units.frequency), "damping ratio (%)"]
+    frequency = label("frequency", units.frequency, "fixed" if fixed else result.frame)
+    captions = [frequency, label("log_decrement") if "log_decrement" in result.rows[0] else "damping ratio (%)"]
     for panel, caption in zip(panels, captions, strict=False):
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
     for b in sorted(shown, key=lambda b: -float(b.frequency[-1])):  # as the legend names them
@@ -119,6 +119,7 @@ def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
     for named, columns in zip(result.summary["branches"], result.branches().values(), strict=True):
         number, speed = named["branch"], columns["speed"]
         frequency = columns["frequency_fixed" if fixed else "frequency"]
+        damping = columns.get("log_decrement", 100.0 * columns["damping"])
         small = np.abs(columns["damping"]) <= np.maximum(ZERO, columns.get("error_bound", 0.0))
         unstable = columns["growth"] > 1e-6 * (np.abs(columns["frequency"]) + np.abs(columns["growth"]))
         further = [
@@ -133,7 +134,7 @@ def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
                 number,
                 units.speeds(np.insert(speed, at, [s for s, _ in further])),
                 units.frequencies(np.insert(frequency, at, [f for _, f in further])),
-                100.0 * np.insert(np.where(small, 0.0, columns["damping"]), at, np.nan),
+                np.insert(np.where(small, 0.0, damping), at, np.nan),
                 np.insert(np.array([(number, float(s)) in ambiguous for s in speed]), at, False),
                 np.insert(unstable, at, False),
             )

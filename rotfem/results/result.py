@@ -77,6 +77,11 @@ class Result(ABC):
         return words if self.status == "done" else f"{words} ({self.status})"
 
     @property
+    def frame(self) -> str:
+        """Frame of components and frequencies: "rotating" with the hub, or "fixed", that of a round shaft."""
+        return "fixed" if self.summary.get("frame") == "fixed" else "rotating"
+
+    @property
     @abstractmethod
     def table(self) -> Columns:
         """Main table: what pandas and, with more of some results, xarray have."""
@@ -125,8 +130,9 @@ class Result(ABC):
 
         The attribute `frame` of the whole says along whose axes components are.
         """
-        names, frame = ("command", "name", "theory", "frame", "kind", "status"), {"frame": "rotating"}
-        return dataset(self.arrays(), frame | {name: self.summary[name] for name in names if name in self.summary})
+        names = ("command", "name", "theory", "kind", "status")
+        known = {name: self.summary[name] for name in names if name in self.summary}
+        return dataset(self.arrays(), known | {"frame": self.frame})
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the files into a folder, in the place of the results that are there; return their paths."""
@@ -187,13 +193,18 @@ class Rows(Result):
     dimension: ClassVar[str] = "row"
 
     def flat_rows(self) -> list[Row]:
-        """Return the rows as a table has them, with one value a name, and in the units shown too."""
-        return ShownUnits.of(self.summary).rows(self.rows)
+        """Return the rows as a table has them, with one value a name, in the units shown too, and with their frame."""
+        frame = {"frame": self.frame} if "frame" in self.summary else {}
+        return [row | frame for row in ShownUnits.of(self.summary).rows(self.rows)]
 
     @property
     def table(self) -> Columns:
         """The rows as columns, labelled by `index`."""
         return Columns.of_rows(self.flat_rows(), self.index, self.dimension)
+
+    def arrays(self) -> Variables:
+        """Return the labelled arrays, name ↦ dimensions and values; the frame is an attribute of all of them."""
+        return {name: array for name, array in super().arrays().items() if name != "frame"}
 
 
 class OfTable:

@@ -68,7 +68,10 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         self.close(error)
 
     def close(self, error: BaseException | None = None) -> None:
-        """Say in the summary what ended the command where its results are not complete."""
+        """Say in the summary what ended the command where its results are not complete; remove an empty folder."""
+        if error is not None and not self.summary and self.comm.rank == 0:
+            with suppress(OSError):
+                self.path.rmdir()
         if self.comm.rank == 0 and self.summary.get("status") == RUNNING:
             if self._growing is not None:
                 self._growing.flush()

@@ -140,7 +140,11 @@ class RunResult(Result):
         ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
         if self.steady:
             scales = by_unit(ends)
-            return [ShortTable(("", "value"), [(named(name), number(ends[name], scales[name])) for name in ends])]
+            return [
+                ShortTable(
+                    (f"{self.frame} frame", "value"), [(named(name), number(ends[name], scales[name])) for name in ends]
+                )
+            ]
         tips = [name for name in ends if name.startswith("tip_u") and f"{name}_min" in found]
         scale = largest(found[f"{name}_{end}"] for name in tips for end in ("min", "max"))
         rows = []
@@ -148,7 +152,11 @@ class RunResult(Result):
             low, high, last = (number(found[f"{name}_{end}"], scale) for end in ("min", "max", "final"))
             when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
             rows.append((named(name), low, when[0], high, when[1], last))
-        return [ShortTable(("", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)] if rows else []
+        return (
+            [ShortTable((f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)]
+            if rows
+            else []
+        )
 
     def arrays(self) -> Variables:
         """Return the history over `t` (s), and shape and resultants over `node`, of a plate with its `triangles`."""

@@ -72,7 +72,13 @@ class UnbalanceResult(Rows):
             )
             for peak in peaks
         ]
-        head = ("x (m)", f"peak at ({units.speed})", "largest semi-axis (m)", "amplification", "margin (%)")
+        head = (
+            "x (m)",
+            f"peak at ({units.speed})",
+            "largest semi-axis, fixed frame (m)",
+            "amplification",
+            "margin (%)",
+        )
         return [ShortTable(head, rows)]
 
     def arrays(self) -> Variables:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_type_hints
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Tag, TypeAdapter, ValidationError, ValidationInfo
+from pydantic import AfterValidator, ConfigDict, Tag, TypeAdapter, ValidationError, ValidationInfo
 
 from rotfem.along import apart
 from rotfem.scene.blades.deck import Asked, keys_of
@@ -16,7 +16,7 @@ from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
 from rotfem.scene.structure import DampingTable, Hinge, Root, SpatialRoot, StructureTable, check_one_hub
-from rotfem.scene.supports import SupportTable
+from rotfem.scene.supports import CouplingTable, SupportTable
 from rotfem.scene.table import (
     BY_SHAPE,
     SceneModel,
@@ -57,11 +57,6 @@ Inertia = Annotated[
 ]
 Length = Annotated[NonNegative, unit("m")]
 Mass = Annotated[NonNegative, unit("kg")]
-
-
-def _as_matrix(inertia: float | Matrix) -> Array:
-    """Return an inertia tensor (kg·m²), shape (3, 3), of one that may be isotropic."""
-    return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
 
 
 class DiskTable(SceneModel):
@@ -120,7 +115,7 @@ class PointMass(SceneModel):
     @property
     def inertia_matrix(self) -> Array:
         """Inertia tensor (kg·m²), shape (3, 3)."""
-        return _as_matrix(self.inertia)
+        return self.inertia * np.eye(3) if isinstance(self.inertia, float) else np.array(self.inertia)
 
     @classmethod
     def _read(cls, data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
@@ -147,17 +142,10 @@ class PointMass(SceneModel):
         return data
 
 
-def _three(value: Any) -> Any:
-    """Return a vector; refuse one of two numbers, which may be meant along the axis or across it."""
-    if isinstance(value, list | tuple) and len(value) == 2:
-        raise problem("", list(value), "must be [x, y, z]: along the beam, and both directions across it")
-    return value
-
-
 class SpatialPointMass(PointMass):
     """A rigid body fixed to a section of a spatial beam."""
 
-    offset: Annotated[Vector, BeforeValidator(_three), unit("m")] = (0.0, 0.0, 0.0)
+    offset: Annotated[Vector, unit("m")] = (0.0, 0.0, 0.0)
 
 
 class BeamStructure(StructureTable):
@@ -204,9 +192,16 @@ class BeamStructure(StructureTable):
         return isinstance(self.root, SpatialRoot) and self.root.pitch.changes
 
     @property
+    def bodies(self) -> dict[str, PointMass]:
+        """Name ↦ rigid body fixed to a section: that at the tip and the masses along the beam."""
+        tip: dict[str, Any] = {"x": self.length, "mass": self.tip_mass, "inertia": self.tip_inertia}
+        tip["offset"] = getattr(self, "tip_offset", (0.0, 0.0, 0.0))
+        return {"tip": PointMass.model_construct(**tip)} | {f"masses_{i}": body for i, body in enumerate(self.masses)}
+
+    @property
     def has_tip_mass(self) -> bool:
         """Whether there is anything at the tip, or at another point, that has inertia."""
-        return self.tip_mass > 0.0 or bool(np.any(_as_matrix(self.tip_inertia))) or bool(self.masses)
+        return any(body.mass > 0.0 or bool(np.any(body.inertia_matrix)) for body in self.bodies.values())
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -273,6 +268,7 @@ class SpatialBeamStructure(BeamStructure):
             section table.
         root: hinges, springs, dampers and pitch angle at the clamp.
         supports: bearings along a shaft.
+        couplings: between parts of it.
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
@@ -287,6 +283,7 @@ class SpatialBeamStructure(BeamStructure):
     precone: Annotated[Number, unit("rad")] = 0.0
     root: SpatialRoot = empty()
     supports: tuple[SupportTable, ...] = ()
+    couplings: tuple[CouplingTable, ...] = ()
 
     @property
     def reference_line(self) -> ReferenceLine | SweptLine | None:
@@ -306,17 +303,11 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """Places (m) of masses, of supports, of kinks of the line, and of the ends of arcs."""
-        line = self.reference_line
-        return apart(
-            (*super().nodes, *(support.x for support in self.supports), *(line.kinks if line is not None else ())),
-            self.length,
-        )
-
-    @property
-    def tip_inertia_matrix(self) -> Array:
-        """Inertia tensor of the tip mass (kg·m²), shape (3, 3)."""
-        return _as_matrix(self.tip_inertia)
+        """Places (m) of masses, supports, and couplings, of kinks of the line, and of the ends of arcs."""
+        line, joints = self.reference_line, sorted(coupling.x for coupling in self.couplings)
+        joints += [(a + b) / 2 for a, b in pairwise(joints)]  # no element is between two of them
+        kinks = line.kinks if line is not None else ()
+        return apart((*super().nodes, *(support.x for support in self.supports), *joints, *kinks), self.length)
 
     @property
     def root_position(self) -> tuple[float, float, float]:
@@ -336,15 +327,15 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def is_round(self) -> bool:
-        """Whether it is straight, and stiffness and inertia are the same in all directions about it.
+        """Whether it is straight, is the same in all directions about its axis, and no support turns.
 
         Masses off the axis are unbalance, no asymmetry.
         """
-        if not self.is_straight or self.hinges or self.pitches:
+        if not self.is_straight or self.hinges or self.pitches or any(s.frame == "rotating" for s in self.supports):
             return False
         places = np.union1d(self.section.knots, self.length)
         places = np.union1d(places, (places[1:] + places[:-1]) / 2)
-        bodies = [self.tip_inertia_matrix, *(m.inertia_matrix for m in self.masses)]
+        bodies = (body.inertia_matrix for body in self.bodies.values())
         return all(map(same_about_axis, (*self.section.at(places).values(), *bodies)))
 
     @property
@@ -370,13 +361,11 @@ class SpatialBeamStructure(BeamStructure):
         data = _with_length(data, info)
         if not isinstance(section, Mapping):
             return data
-        section, lifted = with_columns(section, info, "section."), dict[str, Any]()
-        for key in {"pretwist", "precone"} & section.keys():
-            if key in data:
-                raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
-            with problems_at(f"section.{key}", section[key]):
-                lifted[key] = _reader(key).validate_python(section[key], context=info.context)
-        return {**data, **lifted, "section": {key: value for key, value in section.items() if key not in lifted}}
+        section = with_columns(section, info, "section.")
+        lifted: dict[str, Any] = {key: section.pop(key) for key in ("pretwist", "precone") if key in section}
+        for key in lifted.keys() & data.keys():
+            raise problem(f"section.{key}", None, f"given twice; structure.{key} is also set")
+        return {**data, **lifted, "section": section}
 
     def _check(self) -> None:
         slack = ROUND_OFF if self.line is None else DIGITS
@@ -393,9 +382,14 @@ class SpatialBeamStructure(BeamStructure):
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
         for i, support in enumerate(self.supports):
             check_on_span(f"supports.{i}.x", support.x, self.length)
-        if self.supports and not self.is_straight:
-            why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
-            raise problem("supports", None, why)
+        for i, x in enumerate(joints := [coupling.x for coupling in self.couplings]):
+            if not 0.0 < x < self.length or x in joints[:i]:
+                raise problem(
+                    f"couplings.{i}.x", x, f"must be between 0 and the length {self.length:g}, one at a place"
+                )
+        for key in ("supports", "couplings"):
+            if getattr(self, key) and not self.is_straight:
+                raise problem(key, None, "need a straight beam: without precone, sweep, line, and hub_offset across it")
         springs = {s.x for s in self.supports if s.holds}
         if self.root.driven and not self.root.free and len(springs) < 2:
             raise problem(
@@ -424,16 +418,14 @@ else:
     Structure = Annotated[Any, one_of(_TYPES)]
 
 
-@cache
-def _reader(key: str) -> TypeAdapter[Any]:
-    """Return what reads the value of a key of a spatial beam before the whole table is read."""
-    return TypeAdapter(get_type_hints(SpatialBeamStructure, include_extras=True)[key])
+#: What reads the line before the whole table is read.
+_LINE = TypeAdapter[Any](Line | None, config=ConfigDict(defer_build=True))
 
 
 def _with_length(data: Mapping[str, Any], info: ValidationInfo) -> Mapping[str, Any]:
     """Return the table with the arc length of its line as its length; raise if another one is given."""
     try:
-        rows = _reader("line").validate_python(data.get("line"), context=info.context)
+        rows = _LINE.validate_python(data.get("line"), context=info.context)
     except ValidationError:
         return {**data, "length": 1.0}  # the error of the line is reported at its key
     if rows is None:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
-from pydantic_core import PydanticCustomError
 
 from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
@@ -159,48 +158,29 @@ FROM_FILE = BeforeValidator(read_rows)
 def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
     """Return the names of the columns, if the file has any, and the rows of a table of finite numbers in a CSV file.
 
-    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number. Raise if there is
-    anything else, or nothing, naming line and column.
+    `#` starts a comment. The first row is a header if none of its cells is a number.
     """
-
-    def refused(reason: str) -> PydanticCustomError:
-        return problem("", str(path), reason)
-
     try:
-        text = read_text(path)
+        lines = read_text(path).splitlines()
     except Unreadable as error:
-        raise refused(str(error)) from None
-    header, rows, width, top = list[str](), list[tuple[float, ...]](), 0, 0  # columns of the first row, and its line
-    for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
-        if not (cells := _cells(line)):
+        raise problem("", str(path), str(error)) from None
+    header, rows = list[str](), list[tuple[float, ...]]()
+    for number, line in enumerate(lines, start=1):
+        if not (content := line.split("#", 1)[0].strip()):
             continue
-        values = [number_in(cell) for cell in cells]
-        if not top:
-            width, top = len(cells), number
-            if any(cells) and all(value is None for value in values):
-                header = cells
-                continue
-        for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
-            if value is None or not math.isfinite(value):
-                reason = f"line {number}, column {column}: {shown_cell(cell)} must be a finite number"
-                raise refused(f"{reason} (only the first row may be a header, one without any number)")
-        if len(cells) != width:
-            raise refused(f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
-        rows.append(tuple(value for value in values if value is not None))
+        cells = [cell.strip() for cell in content.split(",")]
+        values = tuple(math.nan if (value := number_in(cell)) is None else value for cell in cells)
+        width = len(header or (*rows, values)[0])
+        if not header and not rows and all(number_in(cell) is None for cell in cells):
+            header = cells
+        elif not all(map(math.isfinite, values)) or len(values) != width:
+            why = f"line {number} must be {width} finite numbers; only the first row may be a header, without any"
+            raise problem("", str(path), why)
+        else:
+            rows.append(values)
     if not rows:
-        raise refused("has no row of numbers")
+        raise problem("", str(path), "has no row of numbers")
     return header, rows
-
-
-def _cells(line: str) -> list[str]:
-    """Return the cells of a line, none of one that is empty but for a comment."""
-    content = line.split("#", 1)[0].strip()
-    return [cell.strip() for cell in content.split(",")] if content else []
-
-
-def shown_cell(cell: str) -> str:
-    """Return a cell as a message shows it: a file may be anything that can be read here, and so a secret."""
-    return f'"{cell}"' if len(cell) <= 12 and cell.isprintable() else f"a text of {len(cell)} characters"
 
 
 def number_in(cell: str) -> float | None:

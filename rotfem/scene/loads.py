@@ -6,8 +6,7 @@ Loads are gravity, and forces and moments at the tip, along the structure, and a
 from __future__ import annotations
 
 import inspect
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationInfo, field_validator
@@ -49,8 +48,7 @@ def function_of(what: str, count: int = 1) -> BeforeValidator:
 
 TimeFunction = Annotated[Callable[[float], Any], function_of("the time t (s)")]
 
-#: What reads components, and rows, before their numbers are counted.
-_VECTOR = TypeAdapter(tuple[Number, ...], config=ConfigDict(defer_build=True))
+#: What reads rows of numbers before these are counted.
 _ROWS = TypeAdapter(Rows, config=ConfigDict(defer_build=True))
 
 
@@ -61,40 +59,103 @@ def are_rows(value: Any) -> bool:
 
 def check_grid(rows: Matrix) -> Matrix:
     """Return rows (x, t, …); refuse them unless every x (m), at least two, stands once with every t (s)."""
-    found = Counter((x, t) for x, t, *_ in rows)
-    (x, t), times = found.most_common(1)[0] if found else ((0.0, 0.0), 0)
-    if times > 1:
-        raise problem("", None, f"{times} rows give x = {x:g}, t = {t:g}")
-    stations, moments = (sorted({pair[k] for pair in found}) for k in (0, 1))
-    if len(stations) < 2 or len(moments) < 2:
-        raise problem("", None, "must have at least two x and two t")
-    missing = next(((x, t) for x in stations for t in moments if (x, t) not in found), None)
-    if missing is not None:
-        raise problem("", None, f"has no row for x = {missing[0]:g}, t = {missing[1]:g}; must have every t at every x")
+    counts = [len({row[k] for row in rows}) for k in (0, 1)]
+    if min(counts) < 2 or not len(rows) == len({row[:2] for row in rows}) == counts[0] * counts[1]:
+        raise problem("", None, "must have every t at every x, each once, and at least two of both")
     return rows
 
 
-#: What a table is over ↦ what checks its rows.
-CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {
-    ("t",): check_increasing,
-    ("x",): check_span,
-    ("x", "t"): check_grid,
+#: Keys of which one says what a quantity is ↦ what its rows are over, and what checks these.
+OVER: dict[str, tuple[str, ...]] = {
+    "value": (),
+    "over_time": ("t",),
+    "over_span": ("x",),
+    "over_span_and_time": ("x", "t"),
+    "regions": (),
 }
-
-#: Key of a table ↦ what its rows are over, and the units of that.
-OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
-OVER_UNITS = {"t": "s", "x": "m"}
+CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {("t",): check_increasing, ("x",): check_span}
+CHECKS |= {("x", "t"): check_grid}
 
 
-#: "dead" loads keep their direction in the rotating frame, "follower" loads turn with the section.
-Kind = Literal["dead", "follower"]
+class Signal(SceneModel):
+    """A vector over time; one with two components gets a third one, zero.
+
+    In a scene it may be written without its table: components, rows or the path of a CSV file of them, or a function.
+
+    Attributes:
+        value: constant components, or None.
+        over_time: rows (t, components), linear between them and constant outside, or a Python function of t; or None.
+    """
+
+    #: Numbers of components that are allowed, and their unit.
+    SIZES: ClassVar[tuple[int, ...]] = (2, 3)
+    UNIT: ClassVar[str] = "m/s**2"
+
+    value: tuple[float, ...] | None = None
+    over_time: Any = None
+
+    @field_validator("value", "over_time", "over_span", "over_span_and_time", mode="plain", check_fields=False)
+    @classmethod
+    def _read_given(cls, value: Any, info: ValidationInfo) -> Any:
+        return None if value is None else cls._components(value, OVER[str(info.field_name)], info)
+
+    @classmethod
+    def _unit(cls, info: ValidationInfo) -> str:
+        return cls.UNIT
+
+    @classmethod
+    def _components(cls, value: Any, over: tuple[str, ...], info: ValidationInfo) -> Any:
+        """Return components, rows (what they are over, components), or the function that stands in their place."""
+        n, sizes = len(over), " or ".join(map(str, cls.SIZES))
+        if over and callable(value):
+            if arguments(value) != n:
+                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
+                needed = f"f({', '.join(over).replace('x', places)})"
+                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
+            return value
+        units = [{"t": "s", "x": "m"}[name] for name in over]
+        given = in_units(read_rows(value, info) if over else value, [cls._unit(info)], units)
+        if not over:
+            given = [given if isinstance(given, list | tuple) else [given]]
+        table = _ROWS.validate_python(given)
+        for i, row in enumerate(table, start=1):
+            if len(row) != len(table[0]) or len(row) - n not in cls.SIZES:
+                shape = f"rows [{', '.join(over)}, …] of {sizes} components each; row {i} has {len(row)} entries"
+                raise problem("", value, f"must be {shape if over else f'a list of {sizes} numbers'}")
+        filled = tuple((*row, 0.0) if len(row) - n == 2 else row for row in table)
+        return CHECKS[over](filled) if over else filled[0]
+
+    @classmethod
+    def _table(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            return data
+        return {"over_time" if callable(data) or are_rows(data) else "value": data}
+
+    def _check(self) -> None:
+        keys = [name for name in OVER if name in type(self).model_fields]
+        given, harmonic = [name for name in keys if getattr(self, name) is not None], getattr(self, "harmonic", None)
+        if len(given) > 1 or not (given or harmonic):
+            added = "" if harmonic is None else "; harmonic may be given in addition"
+            raise problem("", ", ".join(given) or None, f"give exactly one of {', '.join(keys)}{added}")
+
+    @property
+    def given(self) -> tuple[str, Any]:
+        """The key that it is given by, and what that holds: components, rows or a function; None of harmonics alone."""
+        return next(((k, v) for k in OVER if (v := getattr(self, k, None)) is not None), ("value", None))
+
+    @property
+    def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
+        """Place x (None: everywhere) and components of all vectors that it is given by; none of a function."""
+        key, given = self.given
+        for row in () if not isinstance(given, tuple) else given if OVER[key] else [given]:
+            yield row[0] if "x" in OVER[key] else None, row[len(OVER[key]) :]
 
 
 class Harmonic(SceneModel):
     """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
 
     Attributes:
-        amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
+        amplitude: components, as those of a value; of a load over the span also rows (x, components).
         frequency: angular frequency (rad/s), or `per_rev`.
         per_rev: periods in a revolution of the hub.
         phase: by which it is ahead at t = 0 or ψ = 0 (rad).
@@ -110,143 +171,24 @@ class Harmonic(SceneModel):
             raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
 
 
-class Given(SceneModel):
-    """A quantity that is given in one of several ways.
-
-    In a scene it may be written without its table: a value, a table (rows, or the path of a CSV file), or a function.
-    """
-
-    #: Its keys of which exactly one is given.
-    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
-
-    @property
-    def given(self) -> tuple[str, ...]:
-        """The keys by which it is given."""
-        return tuple(name for name in self.WAYS if getattr(self, name) is not None)
-
-    @classmethod
-    def _table(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            one = isinstance(data.get("harmonic"), Mapping | Harmonic)
-            return {**data, "harmonic": [data["harmonic"]]} if one else data
-        return {"function" if callable(data) else "table" if are_rows(data) else "value": data}
-
-    def _check(self) -> None:
-        harmonic = getattr(self, "harmonic", None)
-        if len(self.given) > 1 or not (self.given or harmonic):
-            ways = ", ".join(name for name in self.WAYS if name != "function")
-            added = "" if harmonic is None else "; harmonic may be given in addition"
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}{added}")
-
-
-class Signal(Given):
-    """A vector over time; one with two components gets a third one, zero.
+class Harmonics(Signal):
+    """A signal with harmonic parts.
 
     Attributes:
-        value: constant components, or None.
-        table: rows (t, components), linear between them and constant outside, or None.
-        function: Python function t (s) ↦ components, or None.
-    """
-
-    #: Numbers of components that are allowed, and their unit.
-    SIZES: ClassVar[tuple[int, ...]] = (2, 3)
-    UNIT: ClassVar[str] = "m/s**2"
-
-    value: tuple[float, ...] | None = None
-    table: Matrix | None = None
-    function: TimeFunction | None = None
-
-    @field_validator("value", *OVER, mode="plain", check_fields=False)
-    @classmethod
-    def _read_given(cls, value: Any, info: ValidationInfo) -> Any:
-        over = OVER.get(str(info.field_name))
-        return value if value is None else cls._rows(over, value, info) if over else cls._vector(value, info)
-
-    @classmethod
-    def _unit(cls, info: ValidationInfo) -> str:
-        return cls.UNIT
-
-    @classmethod
-    def _vector(cls, value: Any, info: ValidationInfo) -> tuple[float, ...]:
-        """Return components; a number will do where one is allowed."""
-        value = in_units(value, [cls._unit(info)])
-        if not isinstance(value, list | tuple):
-            if 1 not in cls.SIZES:
-                raise problem("", value, f"must be a list of {_either(cls.SIZES)} numbers")
-            value = [value]
-        return cls._filled(_VECTOR.validate_python(value))
-
-    @classmethod
-    def _rows(cls, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Any:
-        """Return rows (what they are over, components), or the function of the same that stands in their place."""
-        if callable(value):
-            if arguments(value) != len(over):
-                places = "(x, y)" if (info.context or {}).get("type") == "plate" else "x"
-                needed = f"f({', '.join(over).replace('x', places)})"
-                raise problem("", value, f"must be a function {needed}; it takes {arguments(value)} arguments")
-            return value
-        given = in_units(read_rows(value, info), [cls._unit(info)], [OVER_UNITS[name] for name in over])
-        n, table = len(over), _ROWS.validate_python(given)
-        for i, row in enumerate(table, start=1):
-            if len(row) != len(table[0]) or len(row) - n not in cls.SIZES:
-                shape = f"rows [{', '.join(over)}, …] of {_either(cls.SIZES)} components each"
-                raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries")
-        return tuple((*row[:n], *cls._filled(row[n:])) for row in CHECKS[over](table))
-
-    @classmethod
-    def _filled(cls, vector: tuple[float, ...]) -> tuple[float, ...]:
-        """Return components, two with a third one, zero."""
-        if len(vector) not in cls.SIZES:
-            raise problem("", list(vector), f"must be a list of {_either(cls.SIZES)} numbers")
-        return (*vector, 0.0) if len(vector) == 2 else vector
-
-    @property
-    def over(self) -> tuple[tuple[str, ...], Any]:
-        """What it is over, ("t",), ("x",) or ("x", "t"), () of one value, and that, or rows or a function; or None."""
-        name = next(iter(self.given), "value")
-        return {"function": ("t",), **OVER}.get(name, ()), getattr(self, name)
-
-    @property
-    def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
-        """Place x (None: everywhere) and components of all vectors that it is given by; none of a function."""
-        over, given = self.over
-        for row in () if not isinstance(given, tuple) else given if over else [given]:
-            yield row[0] if "x" in over else None, row[len(over) :]
-
-
-def _either(sizes: tuple[int, ...]) -> str:
-    return " or ".join(map(str, sizes))
-
-
-class LoadTable(Signal):
-    """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
-
-    Attributes:
-        table, over_time: rows (t, components), linear between them and constant outside, or None; `over_time` also a
-            function.
-        kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
         harmonic: harmonic terms, added to the rest, or alone.
     """
 
-    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")
-    UNIT: ClassVar[str] = "N"
-
-    kind: Kind = "dead"
-    over_time: Any = None
-    harmonic: tuple[Harmonic, ...] = ()
+    harmonic: Annotated[tuple[Harmonic, ...], LISTED] = ()
 
     @field_validator("harmonic", mode="after")
     @classmethod
     def _read_harmonics(cls, given: tuple[Harmonic, ...], info: ValidationInfo) -> tuple[Harmonic, ...]:
         out = []
         for i, part in enumerate(given):
+            over = ("x",) if "over_span" in cls.model_fields and are_rows(part.amplitude) else ()
             with problems_at(f"{i}.amplitude", part.amplitude):
-                out.append(part.model_copy(update={"amplitude": cls._amplitude(part.amplitude, info)}))
+                out.append(part.model_copy(update={"amplitude": cls._components(part.amplitude, over, info)}))
         return tuple(out)
-
-    @classmethod
-    def _amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        return cls._vector(value, info)
 
     @property
     def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
@@ -255,6 +197,18 @@ class LoadTable(Signal):
         for h in self.harmonic:
             spread = isinstance(h.amplitude[0], tuple)
             yield from ((row[0], row[1:]) for row in h.amplitude) if spread else [(None, h.amplitude)]
+
+
+class LoadTable(Harmonics):
+    """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
+
+    Attributes:
+        kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
+    """
+
+    UNIT: ClassVar[str] = "N"
+
+    kind: Literal["dead", "follower"] = "dead"
 
 
 class MomentTable(LoadTable):
@@ -273,7 +227,6 @@ class SpanLoad(LoadTable):
         over_span_and_time: rows (x, t, components), every t at every x, or a function of place and time; or None.
     """
 
-    WAYS: ClassVar[tuple[str, ...]] = ("value", "over_span", "over_time", "over_span_and_time", "table", "function")
     UNIT: ClassVar[str] = "N/m"
 
     over_span: Any = None
@@ -284,22 +237,19 @@ class SpanLoad(LoadTable):
         return "N/m**2" if cls is SpanLoad and (info.context or {}).get("type") == "plate" else cls.UNIT
 
     @classmethod
-    def _amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        return cls._rows(("x",), value, info) if are_rows(value) else cls._vector(value, info)
-
-    @classmethod
     def _table(cls, data: Any) -> Any:
-        """Take a function of two arguments for one of place and time."""
-        data = super()._table(data)
-        given = data.get("function") if isinstance(data, Mapping) else None
-        if not callable(given) or arguments(given) != 2:
-            return data
-        return {**{key: value for key, value in data.items() if key != "function"}, "over_span_and_time": given}
+        """Take a function of two arguments for one of place and time; a table alone may be over time or the span."""
+        if callable(data) and arguments(data) == 2:
+            return {"over_span_and_time": data}
+        if are_rows(data):
+            how = "over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
+            raise problem("", None, f"must say what a table is over; write {how}")
+        return super()._table(data)
 
     def _check(self) -> None:
         super()._check()
-        over, given = self.over
-        if "x" in over and callable(given) and self.harmonic:
+        key, given = self.given
+        if "x" in OVER[key] and callable(given) and self.harmonic:
             raise problem("harmonic", None, "cannot stand beside a function of the place, which can do the same")
 
 
@@ -317,7 +267,6 @@ class Pressure(SpanLoad):
         regions: name of a surface of the mesh ↦ pressure there, none on the others; or None.
     """
 
-    WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
     SIZES: ClassVar[tuple[int, ...]] = (1,)
     UNIT: ClassVar[str] = "Pa"
 
@@ -341,7 +290,7 @@ class PointLoad(SceneModel):
     x: Place
     force: LoadTable | None = None
     moment: MomentTable | None = None
-    kind: Kind = "dead"
+    kind: Literal["dead", "follower"] = "dead"
 
 
 class UnbalanceTable(SceneModel):
@@ -415,12 +364,12 @@ class LoadsTable(SceneModel):
 # --- checks against what the loads work on ------------------------------------------------------------------------
 
 
-def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) -> None:
-    """Refuse loads that the structure cannot bear, and what a free hub or a scene without time does not have."""
+def check_loads(structure: Any, motion: Any, loads: LoadsTable) -> None:
+    """Refuse loads that the structure cannot bear, and what a free hub does not have."""
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
     for i, mass in enumerate(loads.unbalance):
-        if not getattr(structure, "is_straight", False):
+        if not getattr(structure, "is_straight", False) or any(motion.axis[1:]):
             raise problem(
                 f"loads.unbalance.{i}", None, "needs a shaft: a straight spatial_beam that spins about its axis"
             )
@@ -428,30 +377,28 @@ def check_loads(structure: Any, free_hub: bool, loads: LoadsTable, timed: bool) 
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load, _ in loads.named():
-        key = f"loads.{name}"
+        key, vectors = f"loads.{name}", list(load.vectors)
         if name.endswith("moment"):
             _check_moment(key, structure, load)
-        if isinstance(load, SpanLoad) and load.table is not None:
-            _check_table(key, structure, load.table, timed)
-        for x in (x for x, _ in load.vectors if x is not None):
-            check_on_span(f"{key}.{next(iter(load.given), 'harmonic')}", x, structure.length)
+        elif structure.is_planar:
+            check_in_plane(key, vectors)
+        for x in (x for x, _ in vectors if x is not None):
+            check_on_span(f"{key}.{load.given[0]}", x, structure.length)
         per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
-        if free_hub and per_rev is not None:
+        if motion.is_free and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
             raise problem(f"{key}.harmonic.per_rev", per_rev, why)
-    _check_regions(structure, loads.pressure)
+    known = structure.thickness if structure.type == "plate" and isinstance(structure.thickness, dict) else {}
+    for name in () if loads.pressure is None else loads.pressure.regions or ():
+        if name not in known:
+            has = f"there are {', '.join(known)}" if known else "structure.thickness must be by region"
+            raise problem(f"loads.pressure.regions.{name}", None, f"is no region of the plate; {has}")
 
 
-def _check_table(key: str, structure: Any, table: Matrix, timed: bool) -> None:
-    """Refuse a table without a key that may be over the span; in a history it is over time unless it fits the span."""
-    why = None
-    if not timed:
-        why = "is a table [[t, …], …] over time, which a scene without [time] does not have"
-    elif table[0][0] == 0.0 and table[-1][0] == structure.length:
-        why = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
-    if why is not None:
-        how = "over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
-        raise problem(key, None, f"{why}; write {how}")
+def check_in_plane(key: str, vectors: Iterable[tuple[float | None, tuple[float, ...]]]) -> None:
+    """Refuse what would move a planar beam out of its plane."""
+    if any(len(vector) > 2 and vector[2] != 0.0 for _, vector in vectors):
+        raise problem(key, None, "the third component must be 0 for a planar_beam")
 
 
 def _check_moment(key: str, structure: Any, moment: LoadTable) -> None:
@@ -461,21 +408,10 @@ def _check_moment(key: str, structure: Any, moment: LoadTable) -> None:
             why = "is not available on a plate: at a point it turns the director without limit as the mesh is refined"
         raise problem(key, None, why)
     # A function is checked where it is called; its moment of a planar beam may have one component or three.
-    sizes = {len(vector) for _, vector in moment.vectors}
-    if structure.is_planar and sizes - {1}:
-        raise problem(key, None, "must have one component, about axis 3, for a planar_beam")
-    if not structure.is_planar and sizes - {3}:
-        raise problem(key, None, f"must have three components for a {structure.type}")
-
-
-def _check_regions(structure: Any, pressure: Pressure | None) -> None:
-    known = structure.thickness if pressure is not None and isinstance(structure.thickness, dict) else {}
-    for name in () if pressure is None else pressure.regions or ():
-        if name not in known:
-            has = (
-                f"there are {', '.join(known)}" if known else "needs structure.mesh with structure.thickness by region"
-            )
-            raise problem(f"loads.pressure.regions.{name}", None, f"is no region of the plate; {has}")
+    sizes, size = {len(vector) for _, vector in moment.vectors}, 1 if structure.is_planar else 3
+    if sizes - {size}:
+        count = "one component, about axis 3," if structure.is_planar else "three components"
+        raise problem(key, None, f"must have {count} for a {structure.type}")
 
 
 def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:

@@ -123,10 +123,9 @@ class TorqueMotion(MotionTable):
     speed: Speed = 0.0
 
     def _check(self) -> None:
-        if self.pulses is not None and self.table is not None:
-            raise problem("table", self.table, "give either pulses or table")
-        if self.function is not None and (self.pulses is not None or self.table is not None):
-            raise problem("function", None, "give either a function, which may have pulses in it, or pulses or table")
+        given = [name for name in ("pulses", "table", "function") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise problem(given[1], None, "give one of pulses, table and function")
 
 
 class CallableMotion(MotionTable):

@@ -20,23 +20,13 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 def as_line(rows: Matrix) -> Matrix:
     """Return points (x, y, z) in m; refuse them unless the first is the clamp (0, 0, 0), and they follow a line.
 
-    Two equal rows are a kink; three are refused, and so are rows that leave nothing between two kinks.
+    Two equal rows are a kink.
     """
     if len(set(rows)) < 2 or rows[0] == rows[1] or rows[-1] == rows[-2]:
         raise problem("", None, "must be points [[x, y, z], …], at least two, and no kink at an end")
     if rows[0] != (0.0, 0.0, 0.0):
         raise problem("", list(rows[0]), "the line must start at the clamp, [0, 0, 0]; hub_offset says where that is")
-    for number, (a, b, c) in enumerate(zip(rows, rows[1:], rows[2:], strict=False), start=1):
-        if a == b == c:
-            raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
     line = ReferenceLine(rows)
-    with np.errstate(all="ignore"):  # points whose distances are no numbers have no speed
-        # |dr/ds| over the lengths s of chords, sampled between the points: near 1 where points follow each other, 0.7
-        # at a corner of 90° without a kink, 0 where the line turns back.
-        samples = [(spline, np.linspace(spline.x[:-1], spline.x[1:], 65)) for _, spline in line._pieces]
-        if not np.min([np.min(np.linalg.norm(spline(s, 1), axis=-1)) for spline, s in samples]) > 0.05:
-            why = "the line turns back on itself between two points; they must follow each other along it"
-            raise problem("", None, why)
     along = np.linspace(0.0, line.length, 8 * len(rows) + 1)
     if np.max(np.abs(line.at(along)[1][:, 2])) > 1 - 1e-6:
         reason = "runs along direction 3 somewhere, which leaves section axis 2 no direction; choose other axes"

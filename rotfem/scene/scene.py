@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
@@ -19,7 +19,7 @@ from rotfem.errors import SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import LoadsTable, check_loads
+from rotfem.scene.loads import LoadsTable, check_in_plane, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
     AngularUnit,
@@ -96,10 +96,6 @@ class Scene(SceneModel):
         accuracy_of: its output; by default that of the command, the tip or the frequencies.
         accuracy_budget: limit of the CPU time (s) of all answers together; none by default.
     """
-
-    GONE: ClassVar[Mapping[str, str]] = {
-        "limits": "leave it out: only memory is limited, by the environment variable ROTFEM_MEMORY (GB)"
-    }
 
     structure: Structure
     motion: AnyMotion
@@ -228,10 +224,9 @@ class Scene(SceneModel):
             if support.frame == "fixed" and any(motion.axis[1:]):
                 why = "is of a beam that spins about its own axis; those of others stand in the rotating frame"
                 raise problem(f"structure.supports.{i}.frame", "fixed", why)
-        check_loads(structure, motion.is_free, self.loads, self.time is not None)
+        check_loads(structure, motion, self.loads)
         check_mesh(structure, self.mesh)
-        check_theory(structure, model)
-        check_frame(structure, motion, model)
+        check_prestress(structure, model)
         check_initial(structure, motion, model, self.initial)
         if self.accuracy is None and self.accuracy_budget is not None:
             raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
@@ -291,14 +286,9 @@ def check_planar(motion: MotionTable, loads: LoadsTable) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    forces: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
-    forces |= {f"loads.{name}": load for name, load, _ in loads.named() if not name.endswith("moment")}
-    for key, signal in forces.items():
-        if signal is not None and any(len(vector) > 2 and vector[2] != 0.0 for _, vector in signal.vectors):
-            value = list(signal.value) if signal.value is not None else None
-            raise problem(key, value, "the third component must be 0 for a planar_beam")
-    if loads.gravity[2] != 0.0:
-        raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
+    check_in_plane("loads.gravity", [(None, loads.gravity)])
+    if motion.base_acceleration is not None:
+        check_in_plane("motion.base_acceleration", motion.base_acceleration.vectors)
 
 
 def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
@@ -312,53 +302,14 @@ def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
             raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
-def check_theory(structure: Any, model: ModelTable) -> None:
-    """Refuse a theory that has no strains for the structure."""
-    kind, theory = structure.type, registry.theories[model.theory]
-    if not theory.holds_for(kind):
-        able = ", ".join(show(other.name) for other in registry.theories if other.holds_for(kind))
-        has = ", ".join(theory.strains) or "no structure"
-        raise problem("model.theory", theory.name, f"has strains for {has}, none for a {kind}; allowed there: {able}")
-    check_prestress(structure, model)
-
-
 def check_prestress(structure: Any, model: ModelTable) -> None:
     """Refuse to say what the prestress is of where there is none, or one kind of it only."""
-    kind = structure.type
-    if model.prestress is None:
+    linear = structure.type != "plate" and registry.theories[model.theory].prestress
+    if model.prestress is None or (linear and not (structure.hinges and model.prestress == "all")):
         return
-    if structure.hinges and model.prestress == "all":
-        why = (
-            "is for a root without hinges and springs: the linear structure, held there, has moments that they have not"
-        )
-        raise problem("model.prestress", model.prestress, why)
-    if kind == "plate":
-        raise problem("model.prestress", model.prestress, "is for beams: that of a plate is of its membrane forces")
-    if not registry.theories[model.theory].prestress:
-        able = (show(theory.name) for theory in registry.theories if kind in theory.prestress)
-        raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
-
-
-def check_frame(structure: Any, motion: MotionTable, model: ModelTable) -> None:
-    """Refuse the inertial-frame form where there is none."""
-    if structure.pitches and motion.is_free:
-        raise problem("structure.root.pitch", None, 'over time needs a speed that is prescribed, not type = "torque"')
-    if model.frame != "inertial":
-        return
-    if not structure.is_planar or not registry.theories[model.theory].exact:
-        exact = (show(theory.name) for theory in registry.theories if theory.exact and theory.holds_for("planar_beam"))
-        why = (
-            f'needs structure.type = "planar_beam" and model.theory = {" or ".join(exact)}: displacements relative to '
-            "the inertial frame are large, which only exact strains allow"
-        )
-        raise problem("model.frame", model.frame, why)
-    if motion.is_free:
-        raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
-    structure.damping.check_inertial()
-    for effect in registry.effects:
-        if effect.of_rotation and isinstance(model.effects, tuple) and effect.name in model.effects:
-            why = 'is not a separate effect with frame = "inertial"; it comes from the motion of the clamp'
-            raise problem("model.effects", list(model.effects), f'"{effect.name}" {why}')
+    able = " or ".join(show(theory.name) for theory in registry.theories if theory.prestress)
+    why = f'needs a beam and model.theory = {able}; "all" a root without hinges and springs, which have no moments'
+    raise problem("model.prestress", model.prestress, why)
 
 
 def check_initial(structure: Any, motion: MotionTable, model: ModelTable, initial: Initial) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, StrictBool, Tag, ValidationInfo
@@ -40,10 +40,6 @@ Elements = Annotated[
 Integration = Literal["reduced", "full"]
 
 
-_LADDER = 'it went with version 0.9; "accuracy" chooses mesh and steps, "rotfem explain" the cheapest theory'
-_REDUCED = "reduced models went with version 0.9: leave it out, the full system is computed"
-
-
 class ModelTable(SceneModel):
     """The [model] table.
 
@@ -56,13 +52,6 @@ class ModelTable(SceneModel):
             "all" forces and moments. By default "all" for spatial beams without hinges, else "axial".
         all_unknowns: whether a history keeps unknowns that are zero by symmetry.
     """
-
-    GONE: ClassVar[Mapping[str, str]] = {
-        "tolerance": _LADDER,
-        "on_exceed": _LADDER,
-        "reduced": _REDUCED,
-        "foreshortening": _REDUCED,
-    }
 
     theory: Annotated[str, PlainValidator(lambda value: as_name(value, registry.theories))] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
@@ -279,15 +268,11 @@ class Time(WithParameters):
             raise problem("step", self.step, reason)
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
-        if self.step is not None and self.end + self.step == self.end:
-            raise problem("step", self.step, f"is lost in the round-off of time.end = {self.end:g}")
         if self.output_step is not None and self.output_every != 1:
             raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
         for key in ("max_step", "min_step"):
             if self.tolerance is None and getattr(self, key) is not None:
                 raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
-        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
-            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
 
 
 class ModesTable(SceneModel):
@@ -316,10 +301,6 @@ class Solver(SceneModel):
         increment_tolerance: Newton's method stops at this relative size of the increment.
         max_iterations: most Newton iterations per solve.
     """
-
-    GONE: ClassVar[Mapping[str, str]] = {
-        "continuation": "paths past limit points went with version 0.9: leave it out, the load is raised in steps"
-    }
 
     increment_tolerance: Positive = 1e-9
     max_iterations: Count = 25

@@ -12,9 +12,9 @@ from pydantic import ConfigDict, Discriminator, Field, StrictBool, Tag
 
 from rotfem.errors import SceneError
 from rotfem.registry import Registry, damping_models, register, structures
-from rotfem.scene.loads import Given, Harmonic, TimeFunction
+from rotfem.scene.loads import Harmonics, TimeFunction
 from rotfem.scene.table import LISTED, SceneModel, problem, unit, unknown_key
-from rotfem.scene.values import NonNegative, Number, TimeTable
+from rotfem.scene.values import NonNegative
 
 
 @dataclass(frozen=True)
@@ -130,59 +130,39 @@ class DampingTable(SceneModel):
         families = self.modal.values() if isinstance(self.modal, dict) else [self.modal]
         return any(bool(np.any(np.asarray(ratios))) for ratios in families)
 
-    def check_inertial(self) -> None:
-        """Refuse what has no meaning in the inertial frame."""
-        if self.mass_rate > 0.0:
-            why = 'must be 0 with frame = "inertial", where it would brake the revolution itself'
-            raise problem("structure.damping.rayleigh", list(self.rayleigh), f"the mass-proportional part {why}")
-        if self.has_modal:
-            why = 'is not available with frame = "inertial", where the modes at rest turn; use "rotating"'
-            raise problem("structure.damping.modal", self.modal, why)
-
 
 # --- root and supports of beams ---------------------------------------------------------------------------------------
 
 
-class HarmonicAngle(Harmonic):
-    """A harmonic part of an angle."""
-
-    amplitude: Annotated[Number, unit("rad")]
-
-
-class PitchAngle(Given):
-    """The pitch over time: one of value, table and function, and harmonics in addition or alone.
-
-    In a scene it may be written without its table: a number is a value, [[t, angle], …] or the path of a CSV file a
-    table.
+class PitchAngle(Harmonics):
+    """The pitch over time.
 
     Attributes:
         value: a constant angle (rad), or None.
-        table: rows (t, angle) in s and rad, at rest before the first and after the last; or None.
-        function: Python function t (s) ↦ angle (rad), or None.
+        over_time: rows (t, angle), at rest before the first and after the last; or a function of t; or None.
         rate: Python function t (s) ↦ rate of the function's angle (rad/s); by default differences.
-        harmonic: added to these.
     """
 
-    value: Annotated[Number, unit("rad")] | None = None
-    table: Annotated[TimeTable, unit("rad", over=("s",))] | None = None
-    function: TimeFunction | None = None
+    SIZES: ClassVar[tuple[int, ...]] = (1,)
+    UNIT: ClassVar[str] = "rad"
+
     rate: TimeFunction | None = None
-    harmonic: tuple[HarmonicAngle, ...] = ()
 
     @property
     def changes(self) -> bool:
         """Whether it changes with time; a function is taken to."""
-        moves = self.table is not None and len({angle for _, angle in self.table}) > 1
-        return moves or self.function is not None or any(h.amplitude != 0.0 for h in self.harmonic)
+        rows = self.over_time
+        moves = callable(rows) or len({angle for _, angle in rows or ()}) > 1
+        return moves or any(h.amplitude != (0.0,) for h in self.harmonic)
 
     @property
     def constant(self) -> float:
         """The angle of one that does not change, rad."""
-        return (self.value or 0.0) + (self.table[0][1] if self.table is not None else 0.0)
+        return next((angle for _, (angle,) in self.vectors), 0.0)
 
     def _check(self) -> None:
         super()._check()
-        if self.rate is not None and self.function is None:
+        if self.rate is not None and not callable(self.over_time):
             raise problem("rate", None, "is that of a function; tables and harmonics have their own")
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag
 
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import SceneModel, in_units, problem, unit
-from rotfem.scene.values import Array, NonNegative, Number, check_increasing, is_positive
+from rotfem.scene.values import Array, NonNegative, Number, Positive, check_increasing, is_positive
 
 #: A matrix of two rows of two: yy, yz, zy, zz.
 ZERO = ((0.0, 0.0), (0.0, 0.0))
@@ -217,6 +217,53 @@ class SupportTable(SceneModel):
         """Whether every rotating frame sees it alike: all matrices are [[a, b], [−b, a]]."""
         found = map(matrices, (*self.springs, *self.dampers))
         return all(np.all(A[:, 0, 0] == A[:, 1, 1]) and np.all(A[:, 0, 1] == -A[:, 1, 0]) for A in found)
+
+
+class CouplingTable(SceneModel):
+    """A coupling: springs and dampers between the two parts of a beam, which is rigid in all that is not given.
+
+    Attributes:
+        x: place along the beam (m), between its ends. What else stands there is on the side of the root.
+        stiffness: across the beam (N/m).
+        damping: likewise (N·s/m).
+        tilt_stiffness: against bending (N·m/rad).
+        tilt_damping: likewise (N·m·s/rad).
+        torsion_stiffness: against twist (N·m/rad).
+        torsion_damping: likewise (N·m·s/rad).
+        axial_stiffness: along the beam (N/m).
+        axial_damping: likewise (N·s/m).
+    """
+
+    x: Annotated[Number, unit("m")]
+    stiffness: Annotated[Positive, unit("N/m")] | None = None
+    damping: Annotated[NonNegative, unit("N*s/m")] = 0.0
+    tilt_stiffness: Annotated[Positive, unit("N*m")] | None = None
+    tilt_damping: Annotated[NonNegative, unit("N*m*s")] = 0.0
+    torsion_stiffness: Annotated[Positive, unit("N*m")] | None = None
+    torsion_damping: Annotated[NonNegative, unit("N*m*s")] = 0.0
+    axial_stiffness: Annotated[Positive, unit("N/m")] | None = None
+    axial_damping: Annotated[NonNegative, unit("N*s/m")] = 0.0
+
+    #: Component that jumps ↦ first word of the keys of its stiffness and damping.
+    _KINDS: ClassVar = {"u1": "axial_", "theta1": "torsion_", **dict.fromkeys(("theta2", "theta3"), "tilt_")}
+
+    def of(self, component: str) -> tuple[float | None, float]:
+        """Return stiffness and damping against a jump of a component; None of one that does not jump."""
+        kind = self._KINDS.get(component, "")
+        return getattr(self, f"{kind}stiffness"), getattr(self, f"{kind}damping")
+
+    @property
+    def feeds(self) -> bool:
+        """Whether it has dampers."""
+        return any((self.damping, self.tilt_damping, self.torsion_damping, self.axial_damping))
+
+    def _check(self) -> None:
+        kinds = {kind: self.of(name) for name, kind in {"u2": "", **self._KINDS}.items()}
+        if not any(stiffness for stiffness, _ in kinds.values()):
+            raise problem("stiffness", None, "give one: " + ", ".join(f"{kind}stiffness" for kind in kinds))
+        for kind, (stiffness, damping) in kinds.items():
+            if damping and stiffness is None:
+                raise problem(f"{kind}damping", damping, f"needs {kind}stiffness, without which the coupling is rigid")
 
 
 def matrices(coefficient: Any) -> Array:

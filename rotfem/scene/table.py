@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from pydantic import (
     BaseModel,
@@ -35,20 +33,22 @@ def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
 
 
 @contextmanager
-def problems_at(key: str, value: Any, before: str = "") -> Iterator[None]:
-    """Let a problem raised inside that names no key name one and its value, with some words before what it says."""
+def problems_at(key: str, value: Any) -> Iterator[None]:
+    """Let a problem raised inside that names no key name one and its value."""
     try:
         yield
     except PydanticCustomError as error:
         if (error.context or {}).get("key"):
             raise
-        raise problem(key, value, f"{before}{error.message()}") from None
+        raise problem(key, value, error.message()) from None
     except ValidationError as error:
-        raise problem(key, value, f"{before}{scene_error('', error).allowed}") from None
+        raise problem(key, value, scene_error("", error).allowed) from None
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
+    import difflib  # only where something is wrong
+
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f'did you mean "{matches[0]}"? ' if matches else ""
 
@@ -74,8 +74,6 @@ def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> t
     for name in value:
         if name not in names:
             raise problem("", value, f"{show(name)} is not {kind}; {did_you_mean(name, names)}{allowed}")
-        if list(value).count(name) > 1:
-            raise problem("", value, f"{show(name)} is listed twice")
     return tuple(value)
 
 
@@ -127,9 +125,6 @@ class SceneModel(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
-    #: Keys of earlier versions ↦ what takes their place.
-    GONE: ClassVar[Mapping[str, str]] = {}
-
     def __init__(self, **data: Any) -> None:
         """Make a table in a script; values may be texts with units, as in a scene."""
         try:
@@ -175,8 +170,7 @@ class SceneModel(BaseModel):
         data, names = cls._read(data, info), cls.keys()
         for key in data:
             if key not in names:
-                gone = cls.GONE.get(key)
-                raise problem(str(key), None, f"unknown key; {gone}" if gone else unknown_key(key, names))
+                raise problem(str(key), None, unknown_key(key, names))
         return data
 
     @model_validator(mode="after")
@@ -251,23 +245,19 @@ def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
 
 # --- errors -----------------------------------------------------------------------------------------------------------
 
-#: Types of pydantic's errors ↦ what is allowed, with what they know of it.
-_ALLOWED = {
-    "missing": "required key is missing",
-    "float_type": "must be a number",
-    "int_type": "must be an integer",
-    "finite_number": "must be a finite number",
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
-    "tuple_type": "must be a list",
-    "too_long": "must have at most {max_length} entries",
-    "model_type": _TABLE,
-    "model_attributes_type": _TABLE,
-    "dict_type": _TABLE,
+
+#: What pydantic says ↦ our words.
+_WORDS = {
+    "Field required": "required key is missing",
+    "Input should": "must",
+    "Tuple should": "must",
+    "a valid tuple": "a list",
+    "a valid dictionary": "a table",
+    "a valid number": "a number",
+    "a valid integer": "an integer",
+    "a valid boolean": "true or false",
+    "greater than or equal to": "at least",
+    "less than or equal to": "at most",
 }
 
 
@@ -289,11 +279,10 @@ def _problem(details: dict[str, Any]) -> Fault:
         reason = context["reason"]
     elif kind == "missing" and isinstance(details["loc"][-1], int):
         path, reason = path[:-1], f"must have more entries than {len(value)}"
-    elif kind == "literal_error":
-        names = re.findall(r"'([^']*)'", context["expected"])
-        reason = f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}"
     else:
-        reason = _ALLOWED[kind].format(**context) if kind in _ALLOWED else str(details["msg"])
+        reason = details["msg"]
+        for theirs, ours in _WORDS.items():
+            reason = reason.replace(theirs, ours)
     if isinstance(value, Mapping):
         value = None  # a whole table says nothing that its key does not
     return Fault(".".join(path), value, reason)

@@ -62,9 +62,8 @@ class Beam(Structure):
         k = self.degree = grid.degree
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
-        self.masses = getattr(self.data, "masses", ())
-        supported = getattr(self.data, "supports", ())
-        points = [*problem.loads.places, *((at.x,) for at in (*self.masses, *supported))]
+        fixed = [at for name in ("masses", "supports", "couplings") for at in getattr(s, name, ())]
+        points = [*problem.loads.places, *((at.x,) for at in fixed)]
         self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
@@ -87,6 +86,11 @@ class Beam(Structure):
     def root_turn(self, axis: int) -> Any:
         """Return the rotation at the root about an axis, 1 to 3, of the blade there: an expression, rad."""
         raise NotImplementedError
+
+    def rigid_bodies(self) -> list[tuple[str, Any, Any]]:
+        """Return name, body and measure of the masses at the tip and along the beam."""
+        found = self.data.bodies.items()
+        return [(name, body, self.tip if name == "tip" else self.points.measure((body.x,))) for name, body in found]
 
     def springs(self) -> list[RootSpring]:
         """Return what holds the hinges of the root."""
@@ -229,27 +233,23 @@ class PlanarBeam(Beam):
 
     def bodies(self, effects: Collection[str]) -> list[Body]:
         """Return axis, section director, tip mass and its director, as the effects call for them."""
-        s, q = self.data, self.k.q
+        q = self.k.q
         r, director = self.position(q), self.triad(q)[1]
         bodies = [Body(r, self.section["mass_per_length"], self.dx)]
         if "rotary_inertia" in effects:
             bodies.append(Body(director, self.section["rotary_inertia"], self.dx, False, "rotary_inertia"))
-        if "tip_mass" in effects and s.tip_mass > 0:
-            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.tip, True, "tip_mass"))
-        if "tip_mass" in effects and s.tip_inertia > 0:
-            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.tip, False, "tip_mass"))
-        return bodies + self._point_masses() if "tip_mass" in effects else bodies
+        return bodies + self._rigid_bodies() if "tip_mass" in effects else bodies
 
-    def _point_masses(self) -> list[Body]:
-        """Return the masses along the beam and their directors."""
+    def _rigid_bodies(self) -> list[Body]:
+        """Return the masses at the tip and along the beam, and their directors."""
         out, q = [], self.k.q
-        for i, body in enumerate(self.masses):
-            at, name = self.points.measure((body.x,)), f"masses_{i}"
-            arm = [self.scalar(f"{name}_offset_{j}", c) for j, c in enumerate(body.offset[:2], start=1)]
-            r = self.position(q)
-            x = r + self.turned(q, arm) if any(body.offset) else r
+        for name, body, at in self.rigid_bodies():
+            x = self.position(q)
+            if any(body.offset):
+                arm = [self.scalar(f"{name}_offset_{j}", c) for j, c in enumerate(body.offset[:2], start=1)]
+                x += self.turned(q, arm)
             if body.mass > 0:
-                out.append(Body(x, self.scalar(name, body.mass), at, True, "tip_mass"))
+                out.append(Body(x, self.scalar(f"{name}_mass", body.mass), at, True, "tip_mass"))
             if body.inertia > 0:
                 inertia = self.scalar(f"{name}_inertia", body.inertia)
                 out.append(Body(self.triad(q)[1], inertia, at, False, "tip_mass"))

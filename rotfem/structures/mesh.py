@@ -34,8 +34,7 @@ def boundary_tags(domain: Any, dimension: int, places: Sequence[Any]) -> Any:
 def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
     """Return elements + 1 node positions on [0, length], evenly spaced between knots that are all nodes (m)."""
     stations = np.array([0.0, *knots, length])
-    if len(stations) - 1 > elements:
-        elements = len(stations) - 1
+    elements = max(elements, len(stations) - 1)
     share = np.diff(stations) / length * elements
     counts = np.maximum(1, np.floor(share).astype(int))
     while counts.sum() < elements:

@@ -27,7 +27,7 @@ from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
 from rotfem.structures.mesh import PlateGrid, plate_grid
-from rotfem.structures.mode_names import ModeName, Wave, disk_wave, plate_mode_name
+from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.section_fields import field_values
@@ -135,7 +135,7 @@ class Plate(Structure):
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     planes: ClassVar = {2: (0, 1)}
     is_flat = True
-    prestress_strains: ClassVar = ("membrane",)
+    prestress_strains: ClassVar = ("membrane", "membrane, full", "membrane, reduced")
     stiff: ClassVar = ("shear",)
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
@@ -251,23 +251,25 @@ class Plate(Structure):
         """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses.
 
         Reduced integration does not see displacements like (1 − 3ξ²)(1 − 3η²) of neighbouring elements. So the
-        membrane is integrated fully in the linear theories, where it does not lock; in the others SEEN of its linear
-        part is, and in all of them a part of the shear by u_3 that the bending stiffness bounds.
+        membrane, its directors normal to it, is integrated fully in the linear theories, where it does not lock; in the
+        others SEEN of its linear part is, and in all of them a part of the shear by u_3 that the bending stiffness
+        bounds. What shear adds to the membrane, −½ γ_γ γ_β, has the points of the shear energy, which exceeds it.
         """
         q, counted = self.k.q, self.turns is not None and self.turns.rotation is not None
         membrane, shear, curvature = measures(q, self.director(q)) if counted else measures(q)
         linear, p = self.problem.theory.linear, PlateGradients(self.k.q)
         h, Q, kG = self.section["thickness"], plane_stress(self.section), shear_moduli(self.section)
         strains = [
-            Strain("membrane", _voigt(membrane), h * Q, self.dx if linear else self.dx_elastic),
+            Strain("membrane", _voigt(membrane), h * Q, self.dx_elastic),
             Strain("shear", shear, h * kG, self.dx_elastic),
             Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
         ]
         if self.problem.mesh.integration == "full":
             return strains
         bounded = SEEN * h**3 / (h**2 + abs(ufl.JacobianDeterminant(self.mesh)))
-        unseen = [] if linear else [("membrane", _voigt(ufl.sym(p.du)), SEEN * h * Q)]
-        for name, value, stiffness in [*unseen, ("shear", p.dw, bounded * kG)]:
+        unseen = measures(ufl.as_vector((q[0], q[1], q[2], *p.dw)))[0] if linear else ufl.sym(p.du)
+        in_plane = ("membrane", _voigt(unseen), (1 if linear else SEEN) * h * Q)
+        for name, value, stiffness in [in_plane, ("shear", p.dw, bounded * kG)]:
             strains.append(Strain(f"{name}, full", value, stiffness, self.dx))
             strains.append(Strain(f"{name}, reduced", value, -stiffness, self.dx_elastic))
         return strains
@@ -381,6 +383,24 @@ class Plate(Structure):
         return place[triangles]
 
     @cached_property
+    def _outline(self) -> Disk:
+        x, _ = self.gather(np.zeros(self.V.dofmap.index_map.size_local * self.size))
+        return Disk.of(x[self._order, 0], x[self._order, 1], self.surface())
+
+    @property
+    def disk(self) -> Disk | None:
+        """Nodes of a round plate; None of others."""
+        return self._outline if self._outline.off <= ROUND else None
+
+    @property
+    def doubt(self) -> str:
+        """What is said of a plate that is nearly round; "" of others."""
+        if not ROUND < self._outline.off <= NEARLY:
+            return ""
+        off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
+        return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+
+    @cached_property
     def _order(self) -> npt.NDArray[np.int64]:
         """The permutation that sorts all nodes by x, then y."""
         x, cell = self._points, 1e-7 * self.length  # closer nodes share a coordinate
@@ -388,11 +408,11 @@ class Plate(Structure):
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
-        return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
+        return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk)
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return how a mode travels around a disk; None of other plates."""
-        return disk_wave(coordinates, values[:, 2], axis[2])
+        return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""

@@ -24,14 +24,15 @@ def locate(domain: Any, point: Sequence[float]) -> tuple[npt.NDArray[np.int32], 
     tree = geometry.bb_tree(domain, tdim, padding=spread)
     candidates = geometry.compute_collisions_points(tree, x)
     hits = geometry.compute_colliding_cells(domain, candidates, x).links(0)
-    mine = [int(c) for c in hits if c < owned]
-    nowhere, owner = min(comm.allgather((not mine, comm.rank)))
-    if nowhere:
+    middles = ((float(nodes[domain.geometry.dofmap[c], 0].mean()), int(c)) for c in hits if c < owned)
+    middle, mine = min(middles, default=(np.inf, -1))  # of cells that share it that before it: see `couplings`
+    first, owner = min(comm.allgather((middle, comm.rank)))
+    if first == np.inf:
         return None
     cells: npt.NDArray[np.int32] = np.empty(0, dtype=np.int32)
     where: Any = None
     if comm.rank == owner:
-        cells = np.array(mine[:1], dtype=np.int32)
+        cells = np.array([mine], dtype=np.int32)
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
         where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
         if tdim == 1:  # a node, and all nodes are to have one form

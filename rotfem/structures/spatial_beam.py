@@ -48,20 +48,6 @@ from rotfem.structures.structure import Array, PointValues
 AXIS_DEGREE = 5
 
 
-def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
-    """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X."""
-    if not isinstance(sweep, tuple):
-        chi = beam.scalar("sweep", sweep)
-        X = ufl.SpatialCoordinate(beam.mesh)[0]
-        return chi, X * ufl.cos(chi), X * ufl.sin(chi)
-    angle = beam.field("sweep", lambda x, near: line.angles(x, near)[0], 1)
-    position = fem.functionspace(beam.mesh, ("Lagrange", AXIS_DEGREE))
-    along, across = fem.Function(position, name="along"), fem.Function(position, name="across")
-    along.interpolate(lambda p: line.at(p[0])[0][:, 0])
-    across.interpolate(lambda p: line.at(p[0])[0][:, 1])
-    return angle, along, across
-
-
 def curved_axis(beam: Beam, line: Any) -> tuple[Any, Any, Any]:
     """Return (χ, ζ, r): angles of the tangent (rad, see `rotfem.scene.reference_line`) and position (m) over X.
 
@@ -191,7 +177,9 @@ class SpatialBeam(Beam):
         self.extra = tuple(
             f"u{d}_housing_{j}" for j in range(max((len(b.housing) for b in s.supports), default=0)) for d in (2, 3)
         )
-        super().__init__(problem, comm, s.knots, s.nodes)
+        jumping = [name for name in self.components if any(c.of(name)[0] is not None for c in s.couplings)]
+        self.extra += tuple(f"{name}_coupling" for name in jumping)
+        super().__init__(problem, comm, s.knots, (*s.nodes, *(u.x for u in problem.unbalances)))
         self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
@@ -202,7 +190,7 @@ class SpatialBeam(Beam):
         self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
         # behind one hinge turns add up; behind two or three the clamp is one of turns from the hub
-        counted = len(self.active) == len(self.components) and len(self.released) <= 1
+        counted = len(self.active) == len(self.components) and len(self.released) <= 1 and not s.couplings
         self.turns = SectionTurns.of(self) if counted else None
 
     @classmethod
@@ -215,12 +203,12 @@ class SpatialBeam(Beam):
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
             return False
-        if any(support.couples or support.housing for support in data.supports):
+        if data.couplings or any(support.couples or support.housing for support in data.supports):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
             return False
-        rigid = [(data.tip_offset, data.tip_inertia_matrix), *((m.offset, m.inertia_matrix) for m in data.masses)]
+        rigid = [(body.offset, body.inertia_matrix) for body in data.bodies.values()]
         if any(offset[normal] != 0.0 or np.any(np.delete(J[normal], normal)) for offset, J in rigid):
             return False
         knots = np.union1d(data.section.knots, data.length)
@@ -245,16 +233,12 @@ class SpatialBeam(Beam):
             e_2, e_3 = c * e_2 + s * e_3, c * e_3 - s * e_2
         X = ufl.SpatialCoordinate(self.mesh)[0]
         self._axis = X * e_1
-        sweep, line = self.data.sweep, self.data.reference_line
-        if self.data.line is not None:
+        line = self.data.reference_line
+        if line is not None:
             chi, zeta, r = curved_axis(self, line)
             self._axis = r[0] * e_1 + r[1] * e_2 + r[2] * e_3
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
             e_1, e_3 = ufl.cos(zeta) * e_1 + ufl.sin(zeta) * e_3, ufl.cos(zeta) * e_3 - ufl.sin(zeta) * e_1
-        elif sweep != 0.0:
-            chi, along, across = swept_axis(self, sweep, line)
-            self._axis = along * e_1 + across * e_2
-            e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
             angle = self.section["pretwist"] = self.linear_field(
                 "pretwist", lambda x: np.interp(x, *np.array(twist).T), 0
@@ -375,19 +359,61 @@ class SpatialBeam(Beam):
                     out[f"support_{i}_{name}"] = K @ d + D @ dd
         return out
 
+    @property
+    def _jumps(self) -> dict[str, int]:
+        """Component that jumps in some coupling ↦ number of its jump among the unknowns of a node."""
+        first = len(self.components)
+        names = enumerate(self.extra, start=first)
+        return {name.removesuffix("_coupling"): i for i, name in names if name.endswith("_coupling")}
+
+    def _kinematics(self, functions: tuple[Any, Any, Any, Any]) -> Kinematics:
+        """Return q, v, a and δq; in an element that begins at a coupling the jump there adds to the values of the node.
+
+        The coupling divides the beam so at a point; at other nodes, and before it, there is no jump.
+        """
+        if not self.data.couplings:
+            return super()._kinematics(functions)
+        space = fem.functionspace(self.mesh, ("DG", 0))
+        beyond = fem.Function(space, name="beyond")
+        begins = self.mesh.geometry.x[self.mesh.geometry.dofmap, 0].min(axis=1)
+        apart = np.abs(begins[:, None] - [coupling.x for coupling in self.data.couplings])
+        beyond.x.array[space.dofmap.list[:, 0]] = np.any(apart < ONE * self.length, axis=1)
+        names, jumps = [*self.components, *self.extra], self._jumps
+        whole = [[f[i] + beyond * f[jumps[n]] if n in jumps else f[i] for i, n in enumerate(names)] for f in functions]
+        q, v, a, dq = map(ufl.as_vector, whole)
+        return Kinematics(q, v, a, dq, made_of=functions)
+
+    def couplings(self, frame: Any) -> list[Support]:
+        """Return the couplings: of jumps across the axis, of turns across it, and of stretch and twist along it."""
+        out, jumps = [], {name: self.k.q[i] for name, i in self._jumps.items()}
+        turns = ufl.as_vector([jumps.get(f"theta{i}", 0) for i in (1, 2, 3)])
+        if not self.problem.theory.linear:
+            turns = self._turn.material_rate(turns)
+        jumps |= {f"theta{i}": turns[i - 1] for i in (1, 2, 3)}
+        for i, c in enumerate(self.data.couplings):
+            at = self.points.measure((c.x,))
+            for first, second in (("u2", "u3"), ("theta2", "theta3"), ("u1", "theta1")):
+                K, D = (
+                    frame.coefficients(f"couplings_{i}_{first}_{kind}", ((a or 0.0, 0.0), (0.0, b or 0.0)))
+                    for kind, a, b in zip(("stiffness", "damping"), c.of(first), c.of(second), strict=True)
+                )
+                x = ufl.as_vector([jumps.get(first, 0), jumps.get(second, 0)])
+                out.append(Support(x, K, D, at, at_rest=False, across=first != "u1"))
+        return out
+
     def _housing(self, j: int) -> tuple[Any, Any]:
         """Return the displacements across the beam of the j-th housing under a support."""
         first = len(self.components) + 2 * j
         return self.k.q[first], self.k.q[first + 1]
 
     def without_extra(self) -> list[npt.NDArray[np.int32]]:
-        """Return of each displacement of a housing the local nodes without such a one."""
-        x, out = self.V.tabulate_dof_coordinates()[:, 0], []
-        for j in range(len(self.extra) // 2):
-            places = [support.x for support in self.data.supports if len(support.housing) > j]
-            away = np.all(np.abs(x[:, None] - places) > ONE * self.length, axis=1)
-            out += 2 * [np.flatnonzero(away).astype(np.int32)]
-        return out
+        """Return of each displacement of a housing, and jump in a coupling, the local nodes without such a one."""
+        x, s = self.V.tabulate_dof_coordinates()[:, 0], self.data
+        jumps = self._jumps
+        places = [[b.x for b in s.supports if len(b.housing) > j // 2] for j in range(len(self.extra) - len(jumps))]
+        places += [[c.x for c in s.couplings if c.of(name)[0] is not None] for name in jumps]
+        away = (np.all(np.abs(x[:, None] - there) > ONE * self.length, axis=1) for there in places)
+        return [np.flatnonzero(a).astype(np.int32) for a in away]
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""
@@ -429,7 +455,8 @@ class SpatialBeam(Beam):
         bodies = [self._mass(forms.mass, forms.mass_center, self.dx)]
         if "rotary_inertia" in effects:
             bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
-        bodies += self._tip_bodies() if "tip_mass" in effects else []
+        for rigid in self.rigid_bodies() if "tip_mass" in effects else ():
+            bodies += self._rigid_body(*rigid)
         for i, support in enumerate(self.data.supports if {"supports", "tip_mass"} <= set(effects) else ()):
             for j, under in enumerate(support.housing):
                 mass = self.scalar(f"supports_{i}_housing_{j}_mass", under.mass)
@@ -450,18 +477,9 @@ class SpatialBeam(Beam):
         d = self._from_triad(axis)
         return SectionBody(d, density, measure, False, effect, arm=d, turn=self._turn)
 
-    def _tip_bodies(self) -> list[Body]:
-        """Return the mass at the tip and those along the beam, and their directors."""
-        s = self.data
-        out = self._rigid_body("tip", self.tip, s.tip_mass, s.tip_offset, (s.tip_inertia, s.tip_inertia_matrix))
-        for i, body in enumerate(self.masses):
-            at, inertia = self.points.measure((body.x,)), (body.inertia, body.inertia_matrix)
-            out += self._rigid_body(f"masses_{i}", at, body.mass, body.offset, inertia)
-        return out
-
-    def _rigid_body(self, name: str, at: Any, mass: float, offset: Any, inertia: tuple[Any, Any]) -> list[Body]:
-        """Return a mass (kg) at an offset (m, section axes), and its directors; inertia as given, and as a tensor."""
-        given, tensor = inertia
+    def _rigid_body(self, name: str, body: Any, at: Any) -> list[Body]:
+        """Return a mass at its offset (section axes), and its directors."""
+        mass, offset = body.mass, body.offset
         out = []
         if mass > 0:
             if self.problem.frame == "fixed":  # what is off the axis turns: it is unbalance
@@ -470,9 +488,9 @@ class SpatialBeam(Beam):
                 self.scalar(f"{name}_offset_{i}", c) if c != 0.0 else 0 for i, c in enumerate(offset, start=1)
             )
             out.append(self._mass(self.scalar(f"{name}_mass", mass), center, at, "tip_mass"))
-        for i, (moment, axis) in enumerate(euler_tensor(tensor), start=1):
-            if isinstance(given, float):  # isotropic: each director has half of it
-                density = self.scalar(f"{name}_inertia", given) / 2
+        for i, (moment, axis) in enumerate(euler_tensor(body.inertia_matrix), start=1):
+            if isinstance(body.inertia, float):  # isotropic: each director has half of it
+                density = self.scalar(f"{name}_inertia", body.inertia) / 2
             else:
                 density = self.scalar(f"{name}_director_inertia_{i}", moment)
             out.append(self._director(tuple(axis), density, at, "tip_mass"))

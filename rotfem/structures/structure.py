@@ -239,6 +239,10 @@ class Structure(Loaded):
         """Return the supports between the structure and the fixed frame; none here."""
         return []
 
+    def couplings(self, frame: Any) -> list[Support]:
+        """Return the couplings between parts of the structure; none here."""
+        return []
+
     def support_forces(
         self, frame: Any, speed: float, q: npt.NDArray[Any], v: npt.NDArray[Any]
     ) -> dict[str, npt.NDArray[Any]]:
@@ -272,9 +276,11 @@ class Structure(Loaded):
         return []
 
     def hinged_unknowns(self) -> npt.NDArray[np.intp]:
-        """Return the local numbers of those of owned nodes that the clamp leaves free, in order."""
+        """Return the local numbers of those of owned nodes that the clamp leaves free, and of further unknowns."""
         constrained = self._clamped_components()
-        return self._numbers(None, [i for i in range(self.size) if i not in constrained])
+        free = self._numbers(None, [i for i in range(self.size) if i not in constrained])
+        nodes = np.arange(self.V.dofmap.index_map.size_local if self.extra else 0, dtype=np.int32)
+        return np.union1d(free, self._numbers(nodes, list(range(len(self.active), self.size)))).astype(np.intp)
 
     def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.intp]:
         if nodes is None:

@@ -49,7 +49,7 @@ REFUSALS = (
     Refusal({"frame": ("inertial",), "structure": but("structure", "planar")}, r"model\.frame"),
     Refusal({"frame": ("inertial",), "theory": but("theory", "reissner")}, r"model\.frame"),
     Refusal({"frame": ("inertial",), "motion": FREE}, r"model\.frame"),
-    Refusal({"frame": ("inertial",), "damping": ("modal",)}, r"structure\.damping\.modal"),
+    Refusal({"frame": ("inertial",), "damping": ("modal",)}, r"structure\.damping"),
     Refusal({"root": ("pitch",), "motion": FREE}, r"structure\.root\.pitch"),
     Refusal({**STEADY, "motion": but("motion", "rest", "constant")}, "time: missing"),
     Refusal({**STEADY, "checkpoint": ("resumed",)}, "--(checkpoint|resume): needs a scene with"),

@@ -33,23 +33,14 @@ def test_functions_are_refused_with_the_key() -> None:
         assert caught.value.key.startswith("loads.")
 
 
-def test_a_bare_table_is_over_time_in_a_history_and_refused_without_one() -> None:
-    """A scene without [time] has no table over time: it would be its first row, silently."""
-    assert scene({"distributed": RAMP}, **TIME).loads.distributed is not None
-    for command in (rotfem.run, rotfem.modes):
-        with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
-            command(scene({"distributed": RAMP}))
-    with pytest.raises(SceneError, match=r"from 0 to 10, the length.* over_span"):
-        rotfem.run(scene({"distributed": [[0, 0, 0], [10, 0, 1]]}, **TIME))
-    with pytest.raises(SceneError, match="over_span"):
-        rotfem.campbell(scene({"distributed": RAMP}), "1:2:2")
+def test_a_bare_table_over_time_or_the_span_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
+        scene({"distributed": RAMP}, **TIME)
 
 
 def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
-    assert scene({"distributed": lambda t: (0, t)}).loads.distributed.over[0] == ("t",)  # type: ignore[union-attr]
-    both = scene({"distributed": lambda x, t: (0, x * t)}).loads.distributed
-    assert both is not None
-    assert both.over[0] == ("x", "t")
+    for function, key in ((lambda t: (0, t), "over_time"), (lambda x, t: (0, x * t), "over_span_and_time")):
+        assert scene({"distributed": function}).loads.distributed.given == (key, function)  # type: ignore[union-attr]
 
 
 def test_tables_from_files(tmp_path: Any) -> None:

@@ -50,7 +50,7 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
     """Per revolution under a speed that changes: α = 2ψ, α̇ = 2Ω, α̈ = 2Ω̇; differences of fourth order."""
     motion = {"type": "spin_up", "speed": 5.0, "duration": 2.0}
     parts = [{"amplitude": 0.1, "per_rev": 2.0, "phase": 0.4}, {"amplitude": -0.05, "frequency": 7.0}]
-    found = signal({"table": [[0, 0.1], [2, 0.3]], "harmonic": parts}, motion=motion)
+    found = signal({"over_time": [[0, 0.1], [2, 0.3]], "harmonic": parts}, motion=motion)
     assert found.start == pytest.approx(0.1 + 0.1 * np.cos(0.4) - 0.05, rel=1e-14)
     _, rate, acceleration = differentiated(found.angle)
     for t in (0.3, 1.1, 1.9):
@@ -59,34 +59,34 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
 
 
 def test_units() -> None:
-    given = {"table": [[0, "6 deg"], ["2 min", 0.2]], "harmonic": {"amplitude": "3 deg", "frequency": "1 Hz"}}
+    given = {"over_time": [[0, "6 deg"], ["2 min", 0.2]], "harmonic": {"amplitude": "3 deg", "frequency": "1 Hz"}}
     pitch = scene(given).structure.root.pitch  # type: ignore[union-attr]
-    assert pitch.table == ((0.0, pytest.approx(np.pi / 30)), (120.0, 0.2))  # type: ignore[union-attr]
+    assert pitch.over_time == ((0.0, pytest.approx(np.pi / 30)), (120.0, 0.2))  # type: ignore[union-attr]
     part = pitch.harmonic[0]  # type: ignore[union-attr]
-    assert (part.amplitude, part.frequency) == (pytest.approx(np.pi / 60), pytest.approx(2 * np.pi))
-    assert scene("3 deg").structure.root.pitch.value == pytest.approx(np.pi / 60)  # type: ignore[union-attr]
+    assert (*part.amplitude, part.frequency) == (pytest.approx(np.pi / 60), pytest.approx(2 * np.pi))
+    assert scene("3 deg").structure.root.pitch.value == (pytest.approx(np.pi / 60),)  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
     ("pitch", "more", "key"),
     [
-        ([[0, 0.1], [0, 0.2]], {}, "structure.root.pitch.table"),
-        ([[0, 0.1, 3.0], [1, 0.2, 1.0]], {}, "structure.root.pitch.table"),
-        ({"value": 0.1, "table": [[0, 0.1], [1, 0.2]]}, {}, "structure.root.pitch"),
+        ([[0, 0.1], [0, 0.2]], {}, "structure.root.pitch.over_time"),
+        ([[0, 0.1, 3.0], [1, 0.2, 1.0]], {}, "structure.root.pitch.over_time"),
+        ({"value": 0.1, "over_time": [[0, 0.1], [1, 0.2]]}, {}, "structure.root.pitch"),
         ({}, {}, "structure.root.pitch"),
         ({"harmonic": {"amplitude": 0.1}}, {}, "structure.root.pitch.harmonic.0.frequency"),
         ({"harmonic": {"frequency": 0.1}}, {}, "structure.root.pitch.harmonic.0.amplitude"),
-        (lambda t, x: 0.1, {}, "structure.root.pitch.function"),
+        (lambda t, x: 0.1, {}, "structure.root.pitch.over_time"),
         ({"value": 0.1, "rate": lambda t: 0.0}, {}, "structure.root.pitch.rate"),
-        ({"function": lambda t: 0.1, "rate": 0.0}, {}, "structure.root.pitch.rate"),
-        ([[0, "3 m"], [1, 0]], {}, "structure.root.pitch.table"),
+        ({"over_time": lambda t: 0.1, "rate": 0.0}, {}, "structure.root.pitch.rate"),
+        ([[0, "3 m"], [1, 0]], {}, "structure.root.pitch.over_time"),
         ([[0, 0.1], [1, 0.2]], {"root": {"flap_stiffness": 0.0}}, "structure.root.lag_stiffness"),
         ([[0, 0.1], [1, 0.2]], {"motion": {"type": "torque", "hub_inertia": 1.0}}, "structure.root.pitch"),
     ],
 )
 def test_refused(pitch: Any, more: dict[str, Any], key: str) -> None:
     with pytest.raises(SceneError) as caught:
-        scene(pitch, **more)
+        Problem.of(scene(pitch, **more))
     assert caught.value.key.startswith(key)
 
 

@@ -45,21 +45,19 @@ def test_rows_that_are_meant_are_read(tmp_path: Path, content: str) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("0,O\n1,1\n2,2\n", 'line 1, column 2: "O" must be a finite number'),
-        ("# speed\n\n0,\n1,1\n2,2\n", 'line 3, column 2: "" must be'),
-        ("t,w\ns,rad/s\n0,0\n1,1\n", 'line 2, column 1: "s" must be'),
-        ("t,w\n0,0\n1,\n", 'line 3, column 2: "" must be'),
-        ("t,w\n0,nan\n1,1\n", 'line 2, column 2: "nan" must be'),
-        ("0,0\n1,1e999\n", 'line 2, column 2: "1e999" must be'),
-        ("0,0\n# ramp\n1,1,1\n", "line 3 has 3 columns; must be 2, as in line 1"),
+        ("0,O\n1,1\n2,2\n", "line 1 must be 2 finite numbers"),
+        ("# speed\n\n0,\n1,1\n2,2\n", "line 3 must be 2"),
+        ("t,w\ns,rad/s\n0,0\n1,1\n", "line 2 must be 2"),
+        ("t,w\n0,nan\n1,1\n", "line 2 must be 2"),
+        ("0,0\n# ramp\n1,1,1\n", "line 3 must be 2 finite"),
         ("", "has no row of numbers"),
-        ("0;0\n1;1\n", 'line 2, column 1: "1;1" must be'),
-        ("t,w,a\n# rig\n0,0,0\n1,1,1\n", "[0.0, 0.0, 0.0]: must have at most 2 entries"),
-        ("0,0\n1,5\n# back\n1,6\n", "the first column must increase strictly; row 3: 1 ≤ 1"),
+        ("0;0\n1;1\n", "line 2 must be 1"),
+        ("t,w,a\n# rig\n0,0,0\n1,1,1\n", "[0.0, 0.0, 0.0]: must have at most 2 items"),
+        ("0,0\n1,5\n# back\n1,6\n", "the first column must increase strictly; row 3: 1 twice"),
         ("t,w\n0,0\n", "must have at least two rows"),
     ],
 )
-def test_slips_are_named_by_line_and_cell_or_row(tmp_path: Path, content: str, message: str) -> None:
+def test_slips_are_named_by_line_or_row(tmp_path: Path, content: str, message: str) -> None:
     with pytest.raises(SceneError, match=re.escape(message)) as caught:
         loaded(tmp_path, content)
     assert caught.value.key.startswith("motion.table")
@@ -68,7 +66,7 @@ def test_slips_are_named_by_line_and_cell_or_row(tmp_path: Path, content: str, m
 
 @pytest.mark.parametrize("content", ["root:x:0:0:root:/root:/bin/bash\n" * 3, "secret-of-13ch\n" * 3, "\x1b[2J\n" * 3])
 def test_no_message_shows_the_content_of_another_file(tmp_path: Path, content: str) -> None:
-    with pytest.raises(SceneError, match="must be a finite number") as caught:
+    with pytest.raises(SceneError, match="finite numbers") as caught:
         loaded(tmp_path, content)
     assert content.strip().splitlines()[0] not in str(caught.value)
     assert str(caught.value).isprintable()

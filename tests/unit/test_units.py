@@ -62,7 +62,10 @@ def test_scene_in_units_is_that_in_si():
             "damping": {"rayleigh": ["0.1 1/s", "2 ms"]},
         },
         "motion": {"type": "torque", "hub_inertia": "500 kg m²", "pulses": [["0 s", "100 ms", "2 kN·m"]]},
-        "loads": {"tip_force": {"table": [[0, 0, 0], ["1 min", "1 kN", 3]], "kind": "follower"}, "tip_moment": "2 Nm"},
+        "loads": {
+            "tip_force": {"over_time": [[0, 0, 0], ["1 min", "1 kN", 3]], "kind": "follower"},
+            "tip_moment": "2 Nm",
+        },
         "time": {"end": "2 min", "step": "10 ms"},
     }
     scene = Scene.from_dict(tables)
@@ -71,7 +74,7 @@ def test_scene_in_units_is_that_in_si():
     assert scene.structure.damping.rayleigh == pytest.approx((0.1, 2e-3), rel=1e-14)
     assert scene.motion.hub_inertia == 500.0
     assert scene.motion.pulses == ((0.0, 0.1, 2000.0),)
-    assert scene.loads.tip_force.table == ((0.0, 0.0, 0.0, 0.0), (60.0, 1000.0, 3.0, 0.0))
+    assert scene.loads.tip_force.over_time == ((0.0, 0.0, 0.0, 0.0), (60.0, 1000.0, 3.0, 0.0))
     assert scene.loads.tip_moment.value == (2.0,)
     assert (scene.time.end, scene.time.step) == (120.0, 0.01)
     assert scene.replace({"time.end": "3 min"}).time.end == 180.0

@@ -26,7 +26,7 @@ MOTIONS: dict[str, tuple[dict[str, Any], float]] = {
     "torque pulse": ({"motion": {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.5, 1.5, 100.0]]}}, 4.0),
     "light hub": ({"motion": {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.2, 0.7, 40.0]]}}, 2.0),
     "tip release": ({"motion": STILL, "initial": {"tip_displacement": 1.0}}, 5.0),
-    "late pulse": ({"motion": STILL, "loads": {"tip_force": {"table": LATE}}}, 63.0),
+    "late pulse": ({"motion": STILL, "loads": {"tip_force": {"over_time": LATE}}}, 63.0),
     "sudden stop": ({"motion": STOP}, 3.0),
 }
 
@@ -120,7 +120,7 @@ def test_a_burst_in_a_table_is_not_passed_over() -> None:
     """50 N forth and back over rows of 5 ms, after rest: of a soft mode its impulse alone would be left."""
     t = np.linspace(0.0, 1.0, 201)
     force = np.where(np.abs(t - 0.5) < 0.05, 50.0 * (-1.0) ** np.arange(201), 0.0)
-    loads = {"tip_force": {"table": [[float(a), 0.0, float(b)] for a, b in zip(t, force, strict=True)]}}
+    loads = {"tip_force": {"over_time": [[float(a), 0.0, float(b)] for a, b in zip(t, force, strict=True)]}}
     scene = {"structure": STRUCTURE, "motion": STILL, "mesh": {"elements": 2}, "loads": loads}
     fine = run({**scene, "time": {"end": 1.0, "step": 5e-4, "output_every": 10, "scheme": "esdirk4"}}).history
     found = run({**scene, "time": {"end": 1.0, "tolerance": 1e-2, "output_step": 5e-3}}).history

@@ -22,7 +22,7 @@ ALL: dict[str, Any] = {
     "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0, "base_acceleration": [0.2, 0.1]},
     "loads.gravity": [0.0, -0.3],
 }
-NOT_PLANAR = ("hub_coupling", "trapeze", "supports", "support_dampers")
+NOT_PLANAR = ("hub_coupling", "trapeze", "supports", "support_dampers", "couplings", "coupling_dampers")
 PRESENT = tuple(name for name in registry.effects.names if name not in NOT_PLANAR)
 TIME = {"end": 0.02, "step": 0.01}
 

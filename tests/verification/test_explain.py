@@ -247,7 +247,7 @@ def test_an_explanation_starts_as_its_scene_does(initial: dict[str, Any]) -> Non
 @pytest.mark.parametrize(
     "loads",
     [
-        {"tip_force": {"table": [[0, 0, 0], [0.5, 0, 30.0], [2.0, 0, 0]], "kind": "follower"}},
+        {"tip_force": {"over_time": [[0, 0, 0], [0.5, 0, 30.0], [2.0, 0, 0]], "kind": "follower"}},
         {"gravity": [0.0, -9.81]},
     ],
     ids=["follower", "gravity that turns"],

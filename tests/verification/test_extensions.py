@@ -79,7 +79,7 @@ def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str
     plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
     tables = {"structure": plate, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "half_square"}}
     with pytest.raises(SceneError, match="has strains for planar_beam, none for a plate"):
-        rotfem.Scene.from_dict(tables)
+        rotfem.Problem.of(tables)
 
 
 # --- an effect --------------------------------------------------------------------------------------------------------

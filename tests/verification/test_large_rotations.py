@@ -84,7 +84,7 @@ def wound(kind: str) -> dict[str, Any]:
         "structure": {"type": kind, "length": 1.0, "hub_radius": 0.1, "section": section},
         "motion": {"type": "constant", "speed": 1.0},
         "mesh": {"elements": 8},
-        "loads": {"tip_moment": {"table": table}},
+        "loads": {"tip_moment": {"over_time": table}},
         "time": {"end": 1.0, "step": 4e-3},
         "solver": {"increment_tolerance": 1e-12},
     }

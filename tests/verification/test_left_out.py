@@ -42,8 +42,8 @@ PLATE: dict[str, Any] = {
     "nu": 0.3,
     "rho": 2700.0,
 }
-ACROSS = {"table": [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 2.0]]}
-WITHIN = {"table": [[0.0, 0.0, 0.0, 0.0], [0.3, 1.0, 2.0, 0.0]]}
+ACROSS = {"over_time": [[0.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.0, 2.0]]}
+WITHIN = {"over_time": [[0.0, 0.0, 0.0, 0.0], [0.3, 1.0, 2.0, 0.0]]}
 
 
 def scene(structure: dict[str, Any], theory: str, spin: dict[str, Any], **more: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from rotfem.analysis.sensitivity import sensitivities
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.registry import schemes
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
@@ -217,8 +217,8 @@ def test_modes_that_are_none(modal: Any, key: str, message: str) -> None:
 
 def test_what_cannot_have_it() -> None:
     """The inertial frame, sensitivities, and rotations beyond those of small motions."""
-    with pytest.raises(SceneError, match='use "rotating"'):
-        beam(0.01, theory="reissner", **{"model.frame": "inertial"})
+    with pytest.raises(SceneError, match='"rotating"'):
+        Problem.of(beam(0.01, theory="reissner", **{"model.frame": "inertial"}))
     result = modes(beam(0.01))
     with pytest.raises(InputError, match="sensitivities"):
         sensitivities(result.analysis, result.spinning)

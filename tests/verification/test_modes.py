@@ -24,7 +24,7 @@ from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem
 from rotfem.numerics import eigenproblem as pencil
 from rotfem.numerics.linear import negative_eigenvalues, transposed
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 

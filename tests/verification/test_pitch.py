@@ -67,7 +67,7 @@ def test_rigid_blade(theory: str, precone: float) -> None:
         assert found["pitch"][i] == pytest.approx(0.2 + 0.4 * np.sin(2 * t), rel=1e-12)
 
 
-STAYS = {"table": [[0, 0.3], [2, 0.3]], "harmonic": [{"amplitude": 0.0, "per_rev": 1}]}
+STAYS = {"over_time": [[0, 0.3], [2, 0.3]], "harmonic": [{"amplitude": 0.0, "per_rev": 1}]}
 
 
 @pytest.mark.parametrize("pitch", [lambda t: 0.3, STAYS], ids=["function", "table"])

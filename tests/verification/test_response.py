@@ -160,8 +160,8 @@ def test_without_damping_it_is_said():
     ("changes", "asked", "message"),
     [
         ({"loads": {}}, {}, "needs a harmonic load"),
-        ({"loads": {"tip_force": {**LOAD, "table": [[0, 0, 0], [1, 0, 1]]}}}, {}, "must be constant or harmonic"),
-        ({"loads": {"tip_force": {"table": [[0, 0, 0], [1, 0, 1]]}}}, {}, "needs a harmonic load"),
+        ({"loads": {"tip_force": {**LOAD, "over_time": [[0, 0, 0], [1, 0, 1]]}}}, {}, "must be constant or harmonic"),
+        ({"loads": {"tip_force": {"over_time": [[0, 0, 0], [1, 0, 1]]}}}, {}, "needs a harmonic load"),
         ({"motion": {"type": "torque", "hub_inertia": 100.0}}, {"low": 0.0, "high": 10.0}, "above 0 of a free hub"),
         ({}, {"low": 2.0, "high": 1.0}, "--from"),
         ({}, {"low": "3 m"}, "--from"),

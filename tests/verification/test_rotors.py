@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.linalg import eig
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 import rotfem
 from rotfem.commands.modes import analysis_of
@@ -195,6 +195,15 @@ def test_cross_coupling_makes_forward_whirl_grow() -> None:
         row = by_whirl[way]
         np.testing.assert_allclose(row["growth"], sign * growing.real, rtol=2e-4)
         np.testing.assert_allclose(row["frequency"], abs(growing.imag), rtol=5e-5)
+
+
+def test_damped_bearings_of_a_shaft_that_differs_by_direction() -> None:
+    """In the rotating frame dampers at rest push by the turn of the frame, too: as in the exact theory, 1e-6."""
+    scene = shaft_on_bearings(2e4, 100.0, modes={"count": 4})
+    scene["structure"]["section"] |= {"EI3": 1.3 * EI, "mass_per_length": 1.0}
+    one, other = (rotfem.modes(scene | {"model": {"theory": t}}).rows for t in ("reissner", "consistent_linear"))
+    for name in ("frequency", "growth"):
+        np.testing.assert_allclose(*([row[name] for row in rows] for rows in (one, other)), rtol=1e-6)
 
 
 def test_cross_coupling_leaves_no_plane() -> None:
@@ -495,13 +504,20 @@ def test_internal_damping_turns_with_the_shaft() -> None:
         assert below.rows[0]["growth"] < 0.0 < max(row["growth"] for row in above.rows)
 
 
-def test_torsion_of_a_free_drive_train() -> None:
-    """Three disks on two massless shafts that nothing holds against turning: roots of K − ω² J, 1e-6."""
+@pytest.mark.parametrize("coupling", [None, 3e4])
+def test_torsion_of_a_free_drive_train(coupling: float | None) -> None:
+    """Three disks on two massless shafts that nothing holds against turning: roots of K − ω² J, 1e-6.
+
+    A coupling in each shaft is in series with it.
+    """
     J, k = (4.0, 2.0, 3.0), 2e4
     masses = [{"x": x, "inertia": [[j, 0, 0], [0, j, 0], [0, 0, j]]} for x, j in zip((0.0, 0.5, 1.0), J, strict=True)]
     section = {"EA": 1e9, "GA2": 1e9, "GA3": 1e9, "GJ": 0.5 * k, "EI2": 1e7, "EI3": 1e7, "mass_per_length": 1e-6}
     structure = {"type": "spatial_beam", "length": 1.0, "root": {"driven": True, "free": ["theta1"]}}
     structure |= {"supports": [{"x": x, "stiffness": 1e9} for x in (0.0, 1.0)], "masses": masses, "section": section}
+    if coupling is not None:
+        structure["couplings"] = [{"x": x, "torsion_stiffness": coupling} for x in (0.25, 0.7)]
+        k = 1.0 / (1.0 / k + 1.0 / coupling)
     motion = {"type": "constant", "speed": 10.0, "axis": [1, 0, 0]}
     rows = rotfem.modes({"structure": structure, "motion": motion, "modes": {"count": 3}}).rows
     K = k * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
@@ -549,6 +565,22 @@ def test_tables_of_supports_that_cannot_be(support: dict[str, Any], key: str) ->
         rotfem.Scene.from_dict(tables)
 
 
+@pytest.mark.parametrize(
+    ("coupling", "key"),
+    [
+        ({"x": 1.0, "tilt_stiffness": 1.0}, "x"),
+        ({"x": 0.5}, "stiffness"),
+        ({"x": 0.5, "stiffness": 0.0}, "stiffness"),
+        ({"x": 0.5, "stiffness": 1.0, "tilt_damping": 1.0}, "tilt_damping.*tilt_stiffness"),
+    ],
+)
+def test_couplings_that_cannot_be(coupling: dict[str, Any], key: str) -> None:
+    tables = shaft_on_bearings(1.0)
+    tables["structure"]["couplings"] = [coupling]
+    with pytest.raises(rotfem.SceneError, match=rf"structure\.couplings\.0\.{key}"):
+        rotfem.Scene.from_dict(tables)
+
+
 def test_disk_is_its_mass_and_inertias() -> None:
     """A disk of 280/50 mm, 70 mm wide, of steel, and the same by its numbers."""
     by_size = {"disk": {"outer_diameter": 0.28, "inner_diameter": 0.05, "width": "70 mm", "rho": 7810}}
@@ -590,11 +622,12 @@ def test_housings_in_series() -> None:
         np.block([[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False
     )
     expected = np.sort(values.imag[values.imag > 0.0])[:3]
-    scene = shaft_on_bearings(bearing, modes={"count": 14}, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]})
+    loads = {"unbalance": [{"x": 0.5, "kg_m": 1e-3}], "gravity": [0.0, -1e-3, 0.0]}
+    scene = shaft_on_bearings(bearing, modes={"count": 14}, loads=loads)
     for support in scene["structure"]["supports"]:
         support["housing"] = [{"mass": m, "stiffness": k, "damping": c} for m, k, c in under]
     scene["structure"]["masses"][0]["inertia"] = 1e4  # it does not tilt: both ends move alike, or only their housings
-    for theory in ("reissner", "linear"):
+    for theory in ("reissner", "consistent_linear"):
         found = rotfem.modes(scene | {"model": {"theory": theory}})
         for omega in expected:
             assert np.min(np.abs(found.frequencies - omega)) < 1e-4 * omega
@@ -607,6 +640,36 @@ def test_housings_in_series() -> None:
     history = rotfem.run(scene | {"time": {"end": 0.01, "step": 0.001}, "motion": {**scene["motion"], "speed": speed}})
     assert history.status == "done"
     assert not any("housing" in name for name in history.history)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("frame", ["fixed", "rotating"])
+def test_coupling_across_a_shaft(theory: str, frame: str) -> None:
+    """The overhung disk behind a coupling of stiffness k and 1/s, dampers turning with the shaft: 2e-4, its own mass.
+
+    The coupling adds [[a² / k̂ + s, a / k̂], [a / k̂, 1 / k̂]] to the compliance F of the disk, a before it, with
+    k̂ = k + c (λ − iΩ): det(λ² M − iΩλ G + F⁻¹) = 0; forward whirl grows at 300 rad/s.
+    """
+    k, c, s, a, speed = 2e4, 3.0, 1 / 3e5, 0.3, 300.0
+    motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+    scene = overhung(motion=motion, model={"theory": theory, "frame": frame}, modes={"count": 2})
+    scene["structure"]["section"]["mass_per_length"] = 1e-2
+    coupling = {"x": LENGTH - a, "stiffness": 1 / s, "tilt_stiffness": k, "tilt_damping": c}
+    scene["structure"]["couplings"] = [coupling]
+    rigid = np.array([[LENGTH**3 / 3, LENGTH**2 / 2], [LENGTH**2 / 2, LENGTH]]) / EI + np.diag([s, 0.0])
+    M, G = np.diag([MASS, DIAMETRAL]), np.diag([0.0, POLAR])
+
+    def equation(y: np.ndarray) -> list[float]:
+        lam = complex(*y)
+        F = rigid + np.array([[a * a, a], [a, 1.0]]) / (k + c * (lam - 1j * speed))
+        value = np.linalg.det(lam**2 * M - 1j * speed * lam * G + np.linalg.inv(F)) / 1e8
+        return [value.real, value.imag]
+
+    for row in rotfem.modes(scene).rows:
+        whirl = row["frequency" if frame == "fixed" else "frequency_fixed"]
+        found = np.array([row["growth"], whirl if row["whirl"] == "forward" else -whirl])
+        np.testing.assert_allclose(found, root(equation, found).x, rtol=2e-4, err_msg=row["whirl"])
+        assert (row["growth"] > 0.0) == (row["whirl"] == "forward")
 
 
 def test_a_strut_holds_the_tip_of_a_blade() -> None:
@@ -640,3 +703,96 @@ def test_every_verb_takes_a_shaft_on_any_bearing() -> None:
     answer = rotfem.response(scene | {"loads": load}, 1e-3, 2e-3, number=2)
     series = 1.0 / (1.0 / 2e4 + 1.0 / 5e4)  # the end stands on bearing and housing, with its weight on no other
     np.testing.assert_allclose(answer.amplitude("tip_u2")[0], 1.0 / series, rtol=1e-4)
+
+
+# --- frames, stability, critical speeds -------------------------------------------------------------------------------
+
+
+def spinning_shaft(**changes: Any) -> dict[str, Any]:
+    """Return a slender uniform shaft on two hard pins."""
+    section = {"shape": "circle", "radius": 0.05, "E": 2e11, "nu": 0.3, "rho": 7800.0, "shear_correction": 1.0}
+    supports = [{"x": x, "stiffness": 1e13} for x in (0.0, 10.0)]
+    structure = {"type": "spatial_beam", "length": 10.0, "root": {"driven": True}, "supports": supports}
+    motion = {"type": "constant", "speed": 3000.0, "axis": [1, 0, 0]}
+    return {"structure": structure | {"section": section}, "motion": motion, "modes": {"count": 4}} | changes
+
+
+@pytest.mark.parametrize("speeds", ["0:600:2", "0:600:9"])
+@pytest.mark.parametrize("axis", [1, -1])
+def test_critical_speeds_depend_on_no_grid(speeds: str, axis: int) -> None:
+    """Ω² = EI k⁴/(ρS + ρI k² (1 ∓ 2)), k = nπ/L, of the Rayleigh shaft (Genta 2005, section 4.5): 1e-3, shear, pins.
+
+    They are the same to round-off whatever the speeds.
+    """
+    motion = {"type": "constant", "speed": 1.0, "axis": [axis, 0, 0]}
+    found = [c for c in rotfem.campbell(spinning_shaft(motion=motion), speeds).critical_speeds if c.kind != "per_rev"]
+    k, area, second = np.array([1, 1, 2, 2]) * np.pi / 10.0, np.pi * 0.05**2, np.pi / 4 * 0.05**4
+    polar = np.array([1, -1, 1, -1])  # of backward and forward whirl
+    expected = np.sqrt(2e11 * second * k**4 / (7800.0 * (area + second * k**2 * (1.0 + 2.0 * polar))))
+    np.testing.assert_allclose([c.speed for c in found], expected, rtol=1e-3)
+    ratio = [c.speed / d.speed for c, d in zip(found[1::2], found[::2], strict=True)]
+    np.testing.assert_allclose(np.array(ratio) - 1.0, expected[1::2] / expected[::2] - 1.0, rtol=0.01)
+    assert [c.label for c in found] == [f"{n} {way} whirl" for n in ("1st", "2nd") for way in ("backward", "forward")]
+
+
+def test_critical_speeds_of_whirls_that_are_no_branches() -> None:
+    """Three of the first four modes are torsion; four critical speeds are found all the same."""
+    scene = spinning_shaft()
+    section = {"EA": 1e9, "GA2": 1e9, "GA3": 1e9, "GJ": 10.0, "EI2": 1e6, "EI3": 1e6, "mass_per_length": 61.0}
+    scene["structure"]["section"] = section | {"rotary_inertia2": 0.04, "rotary_inertia3": 0.04}
+    diagram = rotfem.campbell(scene, "0:60:4")
+    own = [c for c in diagram.critical_speeds if c.kind != "per_rev"]
+    assert len(own) == 4
+    assert any(c.branch == 0 for c in own)
+    assert all(c.label == diagram.labels[c.branch - 1] for c in own if c.branch)
+
+
+def test_threshold_of_internal_damping_is_found() -> None:
+    """ω (1 + ζ_ext/ζ_int), from there on: 1e-3 (Genta 2005, section 6.4), with speeds far apart."""
+    eta, c = 2e-5, 20.0
+    scene = shaft_on_bearings(1e9)
+    scene["structure"] |= {"damping": {"kelvin_voigt": eta}}
+    scene["structure"]["supports"].append({"x": 0.5, "damping": c})
+    omega = np.sqrt(48.0 * EI / 10.0)
+    (found,) = rotfem.campbell(scene, "0:5000:3").instabilities
+    assert found.until is None
+    np.testing.assert_allclose(found.speed, omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2)), rtol=1e-3)
+
+
+def film_bearings() -> dict[str, Any]:
+    """Return a disk on a shaft on oil films at 4000 rpm."""
+    film = {"stiffness": [[2.1e7, 3e6], [-4e6, 3.2e7]], "damping": [[4e4, -1.1e4], [-0.9e4, 6e4]]}
+    masses = [{"x": 0.7, "mass": 60.0, "inertia": [[0.9, 0, 0], [0, 0.5, 0], [0, 0, 0.5]]}]
+    section = {"shape": "circle", "radius": 0.045, "E": 2.05e11, "nu": 0.3, "rho": 7850}
+    structure = {"type": "spatial_beam", "length": 1.4, "root": {"driven": True}, "masses": masses, "section": section}
+    structure |= {"supports": [{"x": x} | film for x in (0.0, 1.4)]}
+    motion = {"type": "constant", "speed": "4000 rpm", "axis": [1, 0, 0]}
+    return {"structure": structure, "motion": motion, "modes": {"count": 5}}
+
+
+def test_overdamped_roots_take_no_places_of_whirls() -> None:
+    """Whirls on oil films by an own Timoshenko code in the fixed frame: frequency 2e-4, damping to its three digits."""
+    found = rotfem.modes(film_bearings())
+    rows = [row for row in found.rows if "torsion" not in row["label"]]
+    np.testing.assert_allclose([row["frequency"] for row in rows], [308.99, 322.67, 1882.4, 2004.7], rtol=2e-4)
+    np.testing.assert_allclose([row["damping"] for row in rows], [0.0547, 0.0483, 0.140, 0.187], rtol=5e-3)
+    decrements = [2 * np.pi * row["damping"] / np.sqrt(1 - row["damping"] ** 2) for row in rows]
+    np.testing.assert_allclose([row["log_decrement"] for row in rows], decrements, rtol=1e-9)
+    assert not any("edgewise" in label or "slow" in label for label in found.labels)
+
+
+def test_every_table_says_its_frame() -> None:
+    """Of a round shaft "fixed"; of an unequal one "rotating", with both frequencies |ω ± Ω| of the fixed frame."""
+    scene = shaft_on_bearings(1e9)
+    round_shaft, diagram = rotfem.modes(scene), rotfem.campbell(scene, [0.0, 50.0, 100.0])
+    scene["structure"]["section"] = scene["structure"]["section"] | {"EI3": 1.3 * EI}
+    unequal = rotfem.modes(scene)
+    for result, frame in ((round_shaft, "fixed"), (diagram, "fixed"), (unequal, "rotating")):
+        assert result.frame == frame
+        assert set(result.to_pandas()["frame"]) == {frame}
+        assert result.to_xarray()["frequency"].attrs["long_name"] == f"frequency, {frame} frame"
+        assert any(f"{frame} frame" in head for head in result.tables()[0].head)
+    assert diagram.plot().axes[0].get_ylabel() == "frequency, fixed frame (rad/s)"
+    for row in unequal.rows:
+        both = sorted([row["frequency_fixed"], row["frequency_fixed_2"]])
+        np.testing.assert_allclose(both, sorted([abs(row["frequency"] - 50.0), row["frequency"] + 50.0]))

@@ -41,8 +41,8 @@ def test_step_response(spin_up: Any, theory: str, viscosity: float, given: str, 
     scene = spin_up(SPINNING | {"model.theory": theory, "structure.damping": {"kelvin_voigt": viscosity}})
     result = modes(scene)
     model = state_space(result.analysis, result.spinning, 6)
-    force = {"tip_force": {"table": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}}
-    moment = {"tip_moment": {"table": [[0.0, 0.0], [1e-9, 1.0]]}}
+    force = {"tip_force": {"over_time": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}}
+    moment = {"tip_moment": {"over_time": [[0.0, 0.0], [1e-9, 1.0]]}}
     start = {"initial": {"state": "steady"}, "time": {"end": 1.5, "step": 0.002, "scheme": "esdirk4"}}
     history = run(scene.replace({"loads": moment if given == "tip_moment" else force} | start)).history
     u = np.zeros((len(history["t"]), 3))

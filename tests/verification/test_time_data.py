@@ -24,7 +24,7 @@ HUB = {"type": "torque", "hub_inertia": 1.0}
 DATA: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "speeds": (SPEEDS, {}),
     "speeds, inertial frame": (SPEEDS, {"model": {"frame": "inertial"}}),
-    "load": (SPIN, {"loads": {"distributed": {"table": RAMPS}}}),
+    "load": (SPIN, {"loads": {"distributed": {"over_time": RAMPS}}}),
     "base acceleration": (SPIN | {"base_acceleration": RAMPS}, {}),
     "torque": (HUB | {"table": [[t, f] for t, _, f in RAMPS]}, {}),
     "pulses": (HUB | {"pulses": [[0.1234, 0.3517, 0.5], [0.6, 0.9, -0.3]]}, {}),

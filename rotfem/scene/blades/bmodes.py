@@ -19,7 +19,6 @@ COLUMNS = (
     *("str_tw", "tw_iner", "mass_den", "flp_iner", "edge_iner", "flp_stff", "edge_stff", "tor_stff", "axial_stff"),
     *("cg_offst", "sc_offst", "tc_offst"),
 )
-POSITIVE = COLUMNS[2:9]
 
 #: Keys of the section ↦ columns.
 SECTION = {
@@ -90,7 +89,7 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:
     """Return section and pretwist of a file of section properties, whose columns a main file multiplies by factors."""
     count = deck.count("n_secs", 2)
-    x, table, first = deck.columns("str_tw mass_den", count, "sec_loc span_loc", COLUMNS, COLUMNS, POSITIVE)
+    x, table, first = deck.columns("str_tw mass_den", count, "sec_loc span_loc", COLUMNS, COLUMNS)
     for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
         why = "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read"
         deck.fail(why, first + int(i))
@@ -101,10 +100,6 @@ def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) ->
     # About the centres, not about the line.
     table["edge_stff"] = table["edge_stff"] - table["axial_stff"] * tension**2
     table["edge_iner"] = table["edge_iner"] - table["mass_den"] * table["cg_offst"] ** 2
-    for column in ("edge_stff", "edge_iner"):
-        for i in np.flatnonzero(table[column] <= 0.0):
-            why = f"its offset leaves {column} = {table[column][i]:g} about the centre; must be greater than 0"
-            deck.fail(why, first + int(i))
     section = {key: table[column] for key, column in SECTION.items()}
     for key, y in (("mass_center", table["cg_offst"]), ("tension_center", tension)):
         section[key] = np.stack([y, np.zeros_like(y)], axis=-1)

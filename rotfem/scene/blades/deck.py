@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
-from rotfem.scene.files import Unreadable, number_in, read_bytes, shown_cell
+from rotfem.scene.files import Unreadable, number_in, read_bytes
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
 from rotfem.scene.table import as_name, in_units, problem, problems_at
 from rotfem.scene.values import DIGITS, Array
@@ -115,14 +115,14 @@ class Deck:
         """Return the whole number of the line `value  name …`, at least so many."""
         line, text = self.named(name)
         if not text.isdecimal() or int(text) < least:
-            self.fail(f"{name} is {shown_cell(text)}; must be a whole number, at least {least}", line, 1)
+            self.fail(f"{name} must be a whole number, at least {least}", line, 1)
         return int(text)
 
     def value(self, text: str, line: int, column: int) -> float:
         """Return a word as a finite number; exponents may have Fortran's D."""
         number = number_in(re.sub(r"[dD]", "e", text))
         if number is None or not math.isfinite(number):
-            self.fail(f"{shown_cell(text)} must be a finite number", line, column)
+            self.fail("must be a finite number", line, column)
         return number
 
     def row(self, line: int, columns: int) -> list[float]:
@@ -134,14 +134,10 @@ class Deck:
             self.fail(f"has {len(words)} columns; must be {columns}", line)
         return [self.value(word, line, column) for column, word in enumerate(words, start=1)]
 
-    def table(self, first: int, count: int, names: Sequence[str], positive: Collection[str] = ()) -> dict[str, Array]:
-        """Return the columns (count,) of successive lines by name; refuse values that must be positive and are not."""
+    def table(self, first: int, count: int, names: Sequence[str]) -> dict[str, Array]:
+        """Return the columns (count,) of successive lines by name."""
         rows = [self.row(first + i, len(names)) for i in range(count)]
-        table = dict(zip(names, np.array(rows).T, strict=True))
-        for column, name in enumerate(names, start=1):
-            for i in np.flatnonzero(table[name] <= 0.0) if name in positive else ():
-                self.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
-        return table
+        return dict(zip(names, np.array(rows).T, strict=True))
 
     def columns(
         self,
@@ -150,7 +146,6 @@ class Deck:
         places: str,
         known: Collection[str],
         needed: Sequence[str],
-        positive: Sequence[str],
     ) -> tuple[Array, dict[str, Array], int]:
         """Return the places of stations, parts of the length, the columns there by name, and their first line.
 
@@ -165,29 +160,22 @@ class Deck:
                 self.fail(why, head, column)
         if first not in places.split() or not set(needed) <= set(names):
             self.fail(f"the columns must be {places.replace(' ', ' or ')}, {', '.join(needed)}", head)
-        table = self.table(head + 2, count, [first, *names], positive)
+        table = self.table(head + 2, count, [first, *names])
         x = table.pop(first)
         self.increasing(x, range(head + 2, head + 2 + count), 1.0, first)
         return x, table, head + 2
 
     def hub_and_length(self, hub: str, tip: str) -> tuple[float, float]:
         """Return the radius of the hub and the length beyond it (m) of lines `value  name …`."""
-        inner, outer = self.number(hub), self.number(tip)
-        if not 0.0 <= inner < outer:
-            self.refuse(hub, f"{hub} = {inner:g} must be at least 0 and less than {tip} = {outer:g}")
-        return inner, outer - inner
+        return self.number(hub), self.number(tip) - self.number(hub)
 
     def increasing(
         self, values: Sequence[float] | Array, lines: Sequence[int], last: float = 0.0, what: str = ""
     ) -> None:
         """Refuse a first column, on these lines, that does not rise from 0 strictly, to `last` if that is given."""
-        if values[0] != 0.0:
-            self.fail(f"{what} must start at 0, not at {values[0]:g}", lines[0], 1)
-        for line, before, after in zip(lines[1:], values, values[1:], strict=False):
-            if after <= before:
-                self.fail(f"{what} must increase: {after:g} ≤ {before:g}", line, 1)
-        if last and not math.isclose(values[-1], last, rel_tol=DIGITS):
-            self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", lines[-1], 1)
+        ends = not last or math.isclose(values[-1], last, rel_tol=DIGITS)
+        if values[0] != 0.0 or not np.all(np.diff(values) > 0.0) or not ends:
+            self.fail(f"{what} must rise from 0{f' to {last:g}' if last else ''}", lines[0], 1)
 
 
 # --- formats ---------------------------------------------------------------------------------------------------------

@@ -26,10 +26,7 @@ from rotfem.registry import register
 from rotfem.scene.blades.deck import FROM_HAWC2, Asked, BladeFormat, Deck, find_file, line_of, rows_over, turned_matrix
 from rotfem.scene.section import about_reference, mass_matrices
 from rotfem.scene.table import problem
-from rotfem.scene.values import DIGITS, UPPER, Array, is_positive, symmetric_matrices
-
-#: Files that continue in others, one in the other, at most: a file may name itself.
-DEEPEST = 30
+from rotfem.scene.values import DIGITS, UPPER, Array, symmetric_matrices
 
 #: Columns of a row with centres, and with a full matrix.
 CENTRES = [
@@ -38,9 +35,6 @@ CENTRES = [
 ]
 FULL = ["r", "m", "x_cg", "y_cg", "ri_x", "ri_y", "pitch", "x_e", "y_e"]
 FULL += [f"K{place}" for place in UPPER]
-
-#: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
-POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
 
 
 def recognises(deck: Deck) -> bool:
@@ -126,11 +120,8 @@ def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array
         kinds = {len(CENTRES): "with centres", len(FULL): "with a full matrix"}
         allowed = ", or ".join(f"{number} {kinds[number]}" for number in known)
         deck.fail(f"has {columns} columns; must be {allowed}" + ("" if full is None else f", as FPM {full:d}"), first)
-    table = deck.table(first, count, known[columns], POSITIVE)
+    table = deck.table(first, count, known[columns])
     deck.increasing(table["r"], range(first, first + count), what="r")
-    for i, matrix in enumerate(_matrices(table)["stiffness"] if "K11" in table else ()):
-        if not is_positive(matrix):
-            deck.fail("the stiffness matrix is not positive definite", first + i)
     return table
 
 
@@ -262,21 +253,13 @@ def _main_body(deck: Deck, wanted: str | None) -> list[Command]:
 def _main_bodies(deck: Deck) -> dict[str, list[Command]]:
     """Return name ↦ commands, `begin` first, of the main bodies of a file and of those in which it continues."""
     bodies: dict[str, list[Command]] = {}
-    begins: list[Command] = []
     body: list[Command] = []
-    for command in _commands(deck, deck, DEEPEST):
+    for command in _commands(deck, deck):
         word, *behind = (word.lower() for word in command.words)
-        main = word == "begin" and behind[:1] == ["main_body"]
-        body = [command] if main else [*body, command]
-        if word == "begin":
-            begins.append(command)
-        elif word == "end":
-            if not begins:
-                command.fail("an end without a begin")
-            if begins.pop() is body[0]:
-                bodies[_the(body, "name").words[1]] = body
-    if begins:
-        begins[-1].fail(f"{' '.join(begins[-1].words)} has no end")
+        main = behind[:1] == ["main_body"]
+        body = [command] if main and word == "begin" else [*body, command]
+        if main and word == "end":
+            bodies[_the(body, "name").words[1]] = body
     return bodies
 
 
@@ -286,13 +269,10 @@ def _c2_def(body: list[Command]) -> tuple[list[list[float]], Command]:
     count = int(head.number(2))
     if count < 2 or len(sections) != count:
         head.fail(f"nsec is {count}, at least 2, and there are {len(sections)} lines of sec", 2)
-    for number, section in enumerate(sections, start=1):
-        if len(section.words) != 6 or section.number(2) != number:
-            section.fail(f"must be sec, its number, {number}, x, y, z and twist: 6 columns, not {len(section.words)}")
     return [[section.number(column) for column in range(3, 7)] for section in sections], head
 
 
-def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
+def _commands(deck: Deck, main: Deck, depth: int = 30) -> Iterator[Command]:
     """Yield the commands of a file, with those of files in which it continues in their places."""
     for line, text in enumerate(deck.lines, start=1):
         if not (words := text.split(";")[0].split()):
@@ -302,15 +282,15 @@ def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
             return
         if word != "continue_in_file":
             yield command
-        elif depth == 0 or len(words) < 2:
-            command.fail(f"must name another file; at most {DEEPEST} continue, one in the other")
+        elif depth == 0:  # a file may name itself
+            command.fail("too many files continue one in the other")
         else:
             yield from _commands(_named_file(command, main), main, depth - 1)
 
 
 def _named_file(command: Command, main: Deck) -> Deck:
     """Return the one file that a command names, from the folder of the main file or from one of the two above."""
-    name = command.words[1].strip("\"'")
+    name = (*command.words, "")[1].strip("\"'")
     found = sorted({path for folder in list(main.path.parents)[:3] if (path := find_file(folder, name)) is not None})
     if len(found) != 1:
         what = "there is no file" if not found else "there are several files"
