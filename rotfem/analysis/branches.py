@@ -345,7 +345,7 @@ class Sweep:
         """
         static = [(r["speed"], r["until"] or np.inf) for r in ranges if r["kind"] == "static instability"]
         speeds = [point.speed for point in self.points]
-        own = synchronous(self.analysis, speeds[0], speeds[-1], self.count)
+        own = synchronous(self.analysis, max(-speeds[0], speeds[-1]), self.count)
         out: list[dict[str, Any]] = []
 
         def add(branch: int, kind: str, order: int, k: int, speed: float, **more: str) -> None:
@@ -353,7 +353,8 @@ class Sweep:
             out.append(named | {"branch": branch + 1, "frequency": k * abs(speed), **more})
 
         for speed, way, n in own or ():
-            add(-1, way, 1, 1, speed, label=f"{n}{ordinal_ending(n)} {way} whirl")
+            for signed in (x for x in (-speed, speed) if speeds[0] <= x <= speeds[-1]):
+                add(-1, way, 1, 1, signed, label=f"{n}{ordinal_ending(n)} {way} whirl")
         for i, b in product(range(len(self.paths)), range(self.count)):
             left, right = self.points[i : i + 2]
             before, wave, way = self.wave(left, b), self.wave(right, b), self.direction(right, b)
@@ -465,19 +466,18 @@ class Sweep:
         return None if after is None and grows > 1e-2 * typical else speed
 
 
-def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) -> list[tuple[float, str, int]] | None:
-    """Return (speed, direction, number among those) of the critical speeds of an undamped shaft; None of other rotors.
+def synchronous(analysis: ModalAnalysis, top: float, count: int) -> list[tuple[float, str, int]] | None:
+    """Return (speed, direction, number in it) of the first critical speeds of an undamped shaft; None of other rotors.
 
     Whirl e^{iΩt} at the speed Ω, at which C = ΩG, is an eigenvector of (K − Ω² (M − iG)) x = 0; all three are constant
     and the pencil is Hermitian, so that one solution has all of them (Genta 2005, section 4.5), whatever the grid.
 
     Args:
         analysis: of the shaft.
-        low: first speed of the range, rad/s.
-        high: last speed.
+        top: a speed up to which the bearings are the same, rad/s.
         count: number of speeds, at most.
     """
-    top, names = max(abs(low), abs(high)), list(analysis.structure.unknowns)
+    names = list(analysis.structure.unknowns)
     free = np.tile([n not in ("u1", "theta1") for n in names], analysis.system.V.dofmap.index_map.size_local)
     if not analysis.fixed or analysis.comm.size > 1 or len(free) > MOST_DENSE or top == 0.0 or analysis.mixed.used:
         return None
@@ -504,7 +504,7 @@ def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) ->
         shares = np.linalg.eigvalsh(with_it.conj().T @ with_it - against.conj().T @ against)
         for speed, share in zip(found[group].tolist(), shares, strict=True):
             numbers[way := "forward" if share > 0.0 else "backward"] += 1
-            out += [(signed, way, numbers[way]) for signed in (-speed, speed) if low <= signed <= high]
+            out.append((speed, way, numbers[way]))
     return out[:count]
 
 

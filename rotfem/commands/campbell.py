@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rotfem.accuracy.answer import Setting
 from rotfem.accuracy.errors import Errors, warnings_of
 from rotfem.accuracy.modes import modal_errors
-from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
+from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep, synchronous
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import over_range
 from rotfem.commands.advice import frozen_inputs
@@ -27,7 +27,7 @@ from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.commands.recorder import check_rows
-from rotfem.errors import ComputationError, SceneError, Stopped
+from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
@@ -35,7 +35,7 @@ from rotfem.results.campbell import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST
-from rotfem.structures.mode_names import distinct
+from rotfem.structures.mode_names import distinct, ordinal_ending
 from rotfem.units import speed_text, split_unit
 from rotfem.version import __version__
 
@@ -73,6 +73,7 @@ def campbell(
     rated: float | str | None = None,
     operating: Sequence[float | str] | None = None,
     only: bool = False,
+    map: Mapping[str, Sequence[float]] | str | None = None,
     folder: Path | None = None,
     progress: Progress | None = None,
     hint: Hint | None = silent,
@@ -90,6 +91,9 @@ def campbell(
         operating: lowest and highest speed of operation, likewise.
         only: whether to solve only these speeds: none is inserted where branches are ambiguous, and critical speeds
             come from interpolation between them.
+        map: a scene key ↦ its values, or text such as "structure.supports.*.stiffness=1e6:1e9:20", spaced evenly on a
+            logarithmic scale: synchronous critical speeds of a shaft over them, without damping and unsymmetric
+            stiffnesses, are in `summary["map"]`.
         folder: where the modes of speeds that are finished are kept if it is interrupted, and taken from when the same
             is asked for again; None to keep none.
         progress: called with the share of the speeds done, between 0 and 1.
@@ -115,9 +119,44 @@ def campbell(
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
         analysis = analysis_of(variant, problem, comm)
         kept = None if folder is None or analysis.comm.size > 1 else FinishedSpeeds(folder, variant)
-        return diagram(variant, analysis, values, started, progress, hint, only, kept)
+        result = diagram(variant, analysis, values, started, progress, hint, only, kept)
+        if map is not None:
+            result.summary["map"] = critical_map(variant, *mapped(map), max(-values[0], values[-1]), comm)
+        return result
 
     return answered(scene, compute, comm, terms, top=True)
+
+
+def mapped(given: Mapping[str, Sequence[float]] | str) -> tuple[str, list[float]]:
+    """Return the key and the values of a map of critical speeds."""
+    if not isinstance(given, str):
+        ((key, values),) = given.items()
+        return key, [float(value) for value in values]
+    key, _, text = given.partition("=")
+    with suppress(ValueError), np.errstate(invalid="ignore", divide="ignore"):
+        first, last, number = text.split(":")
+        found = np.geomspace(float(first), float(last), int(number))
+        if 0.0 < found[0] < found[-1] < np.inf:
+            return key, [float(value) for value in found]
+    why = "must be KEY=FIRST:LAST:NUMBER, as structure.supports.*.stiffness=1e6:1e9:20, with 0 < FIRST < LAST"
+    raise SceneError("command line", "--map", given, why)
+
+
+def critical_map(scene: Scene, key: str, values: Sequence[float], top: float, comm: MPI.Comm) -> dict[str, Any]:
+    """Return the first undamped critical speeds of a shaft over the values of a scene key: `key` and `rows`."""
+    rows = []
+    for value in values:
+        variant = scene.replace({key: value})
+        problem = Problem.of(variant).spinning()
+        kept = tuple(name for name in problem.effective_effects() if name not in ("damping", "support_dampers"))
+        analysis = analysis_of(variant, problem.replace(effects=kept), comm)
+        found = synchronous(analysis, top, scene.modes.count)
+        if found is None:
+            why = "is of round shafts that bearings of constant stiffness hold, with up to 2000 unknowns"
+            raise InputError("map", key, why)
+        named = ({"kind": way, "label": f"{n}{ordinal_ending(n)} {way} whirl", "speed": s} for s, way, n in found)
+        rows += [{"value": value, **row} for row in named]
+    return {"key": key, "rows": rows}
 
 
 def diagram(

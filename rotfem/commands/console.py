@@ -14,7 +14,6 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
@@ -30,9 +29,6 @@ if TYPE_CHECKING:
     from rotfem.results.result import Result
     from rotfem.results.result_set import ResultFolder, Writer
     from rotfem.scene import Scene
-
-#: Whether commands run on this process alone, whatever others mpirun has started.
-ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
 
 
 def folded(text: str, at_terminal: bool) -> str:
@@ -68,7 +64,7 @@ class Session:
         with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
             from mpi4py import MPI
 
-            self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
+            self.comm = MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug, self.plots = as_json, quiet, debug, not no_plots
         self.first = self.comm.rank == 0
         self.bar = ProgressBar()

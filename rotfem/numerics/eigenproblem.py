@@ -218,7 +218,8 @@ class Eigenpairs:
     @property
     def overdamped(self) -> Array:
         """Which of them do not vibrate but die away, shape (m,)."""
-        return np.asarray((self.values.imag == 0.0) & (self.values.real < 0.0) & (self.bounds < 1.0))
+        real = np.abs(self.values.imag) <= EQUAL_EIGENVALUES * np.abs(self.values)
+        return np.asarray(real & (self.values.real < 0.0) & (self.bounds < 1.0))
 
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
@@ -392,6 +393,7 @@ class Pencil:
             while (over := int(np.sum(pairs.overdamped))) > self.overdamped:
                 pairs = self.solve(count + over, target)
                 self.overdamped = over
+        pairs.values[pairs.overdamped] = pairs.values.real[pairs.overdamped]
         return pairs.select(np.argsort(pairs.overdamped, kind="stable"))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, ShownUnits, label
-from rotfem.results.plots import BELOW, LEFT, dress
+from rotfem.results.plots import LEFT, dress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +21,14 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Inches: width of the diagram, of the legend beside it, and heights of the panels and of a line of the legend.
-WIDTH, BESIDE, HEIGHTS, LINE = 10.0, 3.2, (4.8, 1.6), 0.185
+#: Height of a name at the end of a line, inch.
+NAME_HEIGHT = 0.16
+
+#: Name at the end of a line, where it ends, and its colour.
+End = tuple[str, float, float, str]
+
+#: Width of the diagram, inch.
+WIDTH = 9.0
 
 
 @dataclass(frozen=True)
@@ -45,14 +53,20 @@ class Branch:
 
     @property
     def style(self) -> dict[str, Any]:
-        """Colour and dashes: waves against the spin are dashed."""
-        return {"color": f"C{(self.number - 1) % 10}", "ls": "--" if "backward" in self.name else "-"}
+        """Colour and dashes (see `style_of`)."""
+        return style_of(self.name, f"C{(self.number - 1) % 10}")
+
+
+def style_of(name: str, color: str = "C2") -> dict[str, Any]:
+    """Return colour and dashes of a line: those of forward and backward whirl; waves against the spin are dashed."""
+    whirls = {"forward whirl": "C0", "backward whirl": "C1"}
+    return {"color": whirls.get(name.partition(" ")[2], color), "ls": "--" if "backward" in name else "-"}
 
 
 def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
-    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named in the legend. With
+    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it. With
     `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds.
     """
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
@@ -63,53 +77,87 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping), initial=0.0) > 0.0 for b in shown)
-    figure = Figure()
-    panels = figure.subplots(1 + damped, 1, sharex=True, squeeze=False)[:, 0]
+    heights: list[float] = [max(4.8, (len(shown) + len(orders) + 1) * NAME_HEIGHT), 1.6][: 1 + damped]
+    above = [b for b in branches if b not in shown]
+    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
+    names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
+    figure = Figure(figsize=(WIDTH, sum(heights)))
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False)[:, 0]
     axis = panels[0]
     frequency = label("frequency", units.frequency, "fixed" if fixed else result.frame)
     captions = [frequency, label("log_decrement") if "log_decrement" in result.rows[0] else "damping ratio (%)"]
     for panel, caption in zip(panels, captions, strict=False):
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
-    for b in sorted(shown, key=lambda b: -float(b.frequency[-1])):  # as the legend names them
-        axis.plot(b.speed, b.frequency, lw=1.6, label=b.name, **b.style)
+        marks(panel, result, units, last)
+    for b in shown:
+        axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
         axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
         for i in np.flatnonzero(b.doubtful):
             axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
         if damped:
             there = np.isfinite(b.damping)
             panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
-    for b in (b for b in branches if b not in shown):
-        axis.plot([], [], " ", label=f"above: {b.name}, {b.frequency[-1]:.3g} {units.frequency}")
-    for panel in panels:
-        marks(panel, result, units, last)
-    for k in orders:
-        reach = top / (k * rise)
+    of_shaft = any("whirl" in b.name for b in shown)  # whose orders are 1X, 2X, …
+    rays = [(f"{k}X" if of_shaft else f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
+    for _, slope in rays:
+        reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
-        axis.plot(x, k * rise * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
-        at = {"textcoords": "offset points", "fontsize": 8, "color": "0.4", "annotation_clip": False}
-        axis.annotate(f"{k}Ω" if k > 1 else "Ω", (x[2], k * rise * x[2]), xytext=(2, 2), **at)
+        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
     crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
+    name_lines(axis, shown, rays, heights[0])
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": "0.4", "va": "bottom"}
+    axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
+        ends = [
+            (b.name, b.speed[i], b.damping[i], b.style["color"])
+            for b in shown
+            for i in np.flatnonzero(~np.isnan(b.damping))[-1:]
+        ]
+        beside(panels[1], ends, NAME_HEIGHT / heights[1])
     name_styles(axis, shown)
     entries = axis.get_legend_handles_labels()
-    below, height = BELOW, max(BELOW + sum(HEIGHTS[: 1 + damped]) + 0.6, LINE * len(entries[0]) + 0.8)
-    figure.set_size_inches(WIDTH, height)
-    for panel, own in zip(panels[::-1], HEIGHTS[: 1 + damped][::-1], strict=True):
-        panel.set_position((LEFT / WIDTH, below / height, 1.0 - (LEFT + BESIDE) / WIDTH, own / height))
-        below += own + 0.2
+    letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
+    right = 0.35 + max(0.068 * letters[0], 0.06 * letters[1])
+    over = 0.4 + max(0.12 * len(names), 0.2 * any(slope * last > top for _, slope in rays))
+    below = 0.65 + 0.2 * -(-len(entries[0]) // 3)
+    height = over + sum(heights) + 0.2 * damped + below
+    figure.set_figheight(height)
+    for panel, own, under in zip(panels, heights, [below + sum(heights[1:]) + 0.2 * damped, below], strict=False):
+        panel.set_position((LEFT / WIDTH, under / height, 1.0 - (LEFT + right) / WIDTH, own / height))
     figure.suptitle(result.title, fontsize=11, y=1.0 - 0.08 / height, va="top")
     if entries[0]:
-        place = (1.0 - (BESIDE - 0.2) / WIDTH, 1.0 - 0.45 / height)
-        figure.legend(*entries, loc="upper left", bbox_to_anchor=place, fontsize=8, frameon=False)
+        figure.legend(*entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
 def fixed_figure(result: CampbellResult) -> Figure:
     """Return the diagram of a rotor as the fixed frame sees it."""
     return campbell_figure(result, fixed=True)
+
+
+def map_figure(result: CampbellResult) -> Figure:
+    """Return the undamped critical speeds over a key, as the stiffness of bearings, on logarithmic axes."""
+    units, over = ShownUnits.of(result.summary), result.summary["map"]
+    figure = Figure(figsize=(WIDTH, 5.4))
+    axis, ends = figure.add_axes((LEFT / WIDTH, 0.11, 1.0 - (LEFT + 1.7) / WIDTH, 0.8)), list[End]()
+    for name in dict.fromkeys(row["label"] for row in over["rows"]):
+        rows, style = [row for row in over["rows"] if row["label"] == name], style_of(name)
+        at, speed = [row["value"] for row in rows], units.speeds([row["speed"] for row in rows])
+        axis.loglog(at, speed, lw=1.6, **style)
+        ends.append((name, at[-1], float(speed[-1]), str(style["color"])))
+    dress(axis, label(over["key"].rpartition(".")[2]), f"undamped critical speed ({units.speed})", size=None)
+    axis.grid(visible=True, which="minor", lw=0.2, alpha=0.6)
+    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlim(min(row["value"] for row in over["rows"]), max(row["value"] for row in over["rows"]))
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_ylim(axis.get_ylim())
+    beside(axis, ends, NAME_HEIGHT / (0.8 * 5.4))
+    figure.suptitle(f"{result.title}, critical speeds", fontsize=11)
+    return figure
 
 
 def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
@@ -197,11 +245,52 @@ def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool
 
 
 def name_styles(axis: Axes, branches: list[Branch]) -> None:
-    """Name crosses and broad lines in the legend, as far as there are some."""
+    """Name dashes, crosses and broad lines in the legend, as far as there are some."""
     kinds: tuple[tuple[bool, str, dict[str, Any]], ...] = (
+        (any(b.style["ls"] == "--" for b in branches), "backward", {"color": "0.3", "ls": "--"}),
         (any(np.any(b.unstable) for b in branches), "grows", {"color": "C3", "ls": "", "marker": "x"}),
         (any(np.any(b.doubtful) for b in branches), "ambiguous", {"color": "0.6", "lw": 7, "alpha": 0.5}),
     )
     for there, name, style in kinds:
         if there:
             axis.plot([], [], label=name, **style)
+
+
+def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], height: float) -> None:
+    """Write the names of the branches at their ends, and of the lines kΩ (rays, with slopes) where they leave the axis.
+
+    The axis is of a height in inch.
+    """
+    last, top = axis.get_xlim()[1], axis.get_ylim()[1]
+    text: dict[str, Any] = {"annotation_clip": False, "fontsize": 8}
+    ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
+    ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
+    beside(axis, ends, NAME_HEIGHT / height)
+    leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
+    at = spread([x for _, x in leaving], 0.42 / (WIDTH - 3.0) * last, (0.0, last))  # a name is 0.42 inch wide
+    for (name, _), place in zip(leaving, at, strict=True):
+        axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
+
+
+def beside(axis: Axes, ends: list[End], gap: float) -> None:
+    """Write names at the right of a panel whose limits are set, near ends of lines; gaps are in parts of its height."""
+    heights = [float(axis.transAxes.inverted().transform(axis.transData.transform((x, y)))[1]) for _, x, y, _ in ends]
+    for (name, x, y, color), place in zip(ends, spread(heights, gap, (0.0, 1.0)), strict=True):
+        line = {"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0, "relpos": (0.0, 0.5)}
+        at: dict[str, Any] = {"xytext": (1.02, place), "textcoords": "axes fraction", "va": "center", "fontsize": 8}
+        axis.annotate(name, (x, y), color=color, arrowprops=line, annotation_clip=False, **at)
+
+
+def spread(values: list[float], gap: float, limits: tuple[float, float]) -> list[float]:
+    """Return the values closest to those given that are `gap` apart and within limits, so that labels can be read.
+
+    By least squares: with y_i = z_i + i gap in the order of the values, z is their isotonic regression.
+    """
+    if not values:
+        return []
+    order = np.argsort(values, kind="stable")
+    steps = min(gap, (limits[1] - limits[0]) / max(len(values) - 1, 1)) * np.arange(len(values))
+    z = isotonic_regression(np.asarray(values)[order] - steps).x
+    out = np.empty(len(values))
+    out[order] = np.clip(z, limits[0], limits[1] - steps[-1]) + steps
+    return [float(y) for y in out]

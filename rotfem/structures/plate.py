@@ -422,9 +422,7 @@ class Plate(Structure):
         tilt = np.abs(q[: self.size * owned].reshape(-1, self.size)[:, 4])
         worst = self.comm.allreduce(float(tilt.max(initial=0.0)), op=MPI.MAX)
         if worst > limit:
-            raise ComputationError(
-                f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {limit}); in the theory "
-                f"{self.problem.theory.name} the director's angles are limited there, not about direction 2",
-                time,
-                f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
+            what = (
+                f"the plate has turned about direction 1 by {worst:.3g} rad; {self.problem.theory.name} ends at {limit}"
             )
+            raise ComputationError(what, time, f'a smaller load, or model.theory = "{richest().name}"')

@@ -63,7 +63,7 @@ VERBS = {
     "campbell": ("campbell", "blade.toml", "--speeds", "0:60:4rpm"),
     "response": ("response", "arm.toml", "--from", "0.2Hz", "--to", "1Hz", "--number", "20"),
     "check": ("check", "blade.toml"),
-    "explain": ("explain", "blade.toml", "--check"),
+    "explain": ("explain", "blade.toml"),
     "cost": ("cost", "blade.toml", "--quick", "--budget", "60s", "--accuracy", "0.1"),
     "sweep": ("sweep", "blade.toml", "--set", "motion.speed=0:20:2rpm", "--", "modes"),
     "import": ("import", "Blade.st", "-o", "imported.toml"),

@@ -13,7 +13,7 @@ from rotfem.along import FORCES, STRAINS
 from rotfem.results.campbell import CampbellResult
 from rotfem.results.modes import ModesResult, ResponseResult
 from rotfem.results.of_scene import CheckResult
-from rotfem.results.plots_campbell import campbell_figure
+from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.run import RunResult, StationHistory
 from rotfem.results.surfaces import Surface
 from tests.figures import check
@@ -70,13 +70,13 @@ def test_a_campbell_diagram_can_be_read(frequencies: dict[str, float], orders: l
 
 
 def test_the_limit_follows_the_modes_that_lines_meet() -> None:
-    """At 2 rad/s the line 3Ω reaches 6 rad/s: the first mode is met, the second the next; others are in the legend."""
-    figure = campbell_figure(diagram(BLADE | FURTHER, orders=[1, 3]))
-    axis, names = figure.axes[0], {text.get_text() for text in figure.legends[0].get_texts()}
+    """At 2 rad/s the line 3Ω reaches 6 rad/s: the first mode is met, the second is the next; others are named above."""
+    axis = campbell_figure(diagram(BLADE | FURTHER, orders=[1, 3])).axes[0]
     highest = np.hypot(6.7, np.sqrt(1.3) * 2.0) / (2 * np.pi)
     assert highest < axis.get_ylim()[1] < 1.1 * highest
-    assert {"1st flapwise", "1st edgewise"} <= names
-    assert sum(name.startswith("above: ") for name in names) == 8
+    names = [text.get_text() for text in axis.texts]
+    assert {"1st flapwise", "1st edgewise"} <= set(names)
+    assert any("↑ 4 more" in name and "↑ 2nd flapwise" in name for name in names)
     everything = campbell_figure(diagram(BLADE | FURTHER, orders=[])).axes[0]
     assert everything.get_ylim()[1] > 70.0 / (2 * np.pi)
 
@@ -89,6 +89,12 @@ def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
     lines = [line for line in frequency.get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
     assert np.min(lines[0].get_ydata()) == 0.0
     assert any(np.array_equal(line.get_ydata(), 2.0 * np.ones(len(SPEEDS))) for line in damping.get_lines())
+
+
+def test_labels_are_spread_least() -> None:
+    assert spread([5.0, 1.0, 1.0], 1.0, (0.0, 9.0)) == [5.0, 0.5, 1.5]
+    assert spread([8.9, 9.0], 1.0, (0.0, 9.0)) == [8.0, 9.0], "labels stay within the limits"
+    assert spread([1.0, 1.0, 1.0], 5.0, (0.0, 4.0)) == [0.0, 2.0, 4.0], "as far apart as there is room"
 
 
 # --- histories and shapes ---------------------------------------------------------------------------------------------
