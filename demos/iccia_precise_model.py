@@ -23,7 +23,7 @@ from _demo import command_line, report, say
 
 import rotfem
 from rotfem.numerics.eigenproblem import Pencil
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 
 SCENE = Path(__file__).with_name("iccia_hub_beam.toml")
 REFERENCE = 100 * (8.079190 / 6.417749 - 1)  # %; Legendre–Ritz, Euler–Bernoulli (docs/theory.md, errata)

@@ -34,14 +34,12 @@ class Registry(Generic[E]):
     """
 
     def __init__(self, kind: str, *homes: str):
-        self.kind, self._homes, self._order = kind, homes, homes
+        self.kind, self._homes = kind, homes
         self._entries: dict[str, E] = {}
 
     def add(self, entry: E) -> None:
         """Add an entry."""
         self._load()
-        if not isinstance(entry.name, str) or not entry.name.isidentifier():
-            raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
         if entry.name in self._entries:
             raise ValueError(f"{entry.name!r} is the name of another {self.kind} already")
         self._entries[entry.name] = entry
@@ -57,10 +55,9 @@ class Registry(Generic[E]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names: of several homes in the order of these, whichever was imported first."""
+        """All names."""
         self._load()
-        order = {home: place for place, home in enumerate(self._order)}
-        return tuple(sorted(self._entries, key=lambda name: order.get(self._entries[name].__module__, len(order))))
+        return tuple(self._entries)
 
     def __getitem__(self, name: str) -> E:
         self._load()
@@ -85,6 +82,7 @@ blade_formats: Registry[Any] = Registry(
     "rotfem.scene.blades.bmodes",
     "rotfem.scene.blades.hawc2",
     "rotfem.scene.blades.windio",
+    "rotfem.scene.rotors.ross",
 )
 motion_laws: Registry[Any] = Registry("type of motion", "rotfem.scene.motion")
 damping_models: Registry[Any] = Registry("damping model")
@@ -101,13 +99,9 @@ def register(entry: Entry | type[Entry]) -> None:
             `Scheme` or `MotionLaw`.
 
     Raises:
-        TypeError: it is none of these.
-        ValueError: its name is taken, or no name.
+        ValueError: its name is taken.
     """
-    registry = getattr(entry, "registry", None)
-    if not isinstance(registry, Registry):
-        raise TypeError(f"{entry!r} is none of what can be registered: cannot be registered")
-    registry.add(entry)
+    entry.registry.add(entry)
 
 
 def resolved(function: str | Callable[..., Any]) -> Callable[..., Any]:

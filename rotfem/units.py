@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from functools import cache, lru_cache
@@ -41,17 +40,12 @@ def unit_of(text: str) -> str:
     return found[2] or "" if found else ""
 
 
-def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
+def si(value: float | str, unit: str, key: str) -> float:
     """Return a number in a unit, of a number or a text such as "12.1 rpm"."""
-    if not isinstance(value, str):
-        return value
-    units, why = [unit] if isinstance(unit, str) else unit, ""
-    for wanted in units:
-        try:
-            return quantity(value, wanted)
-        except ValueError as error:
-            why = why or str(error)
-    raise InputError(key, value, why)
+    try:
+        return quantity(value, unit) if isinstance(value, str) else value
+    except ValueError as error:
+        raise InputError(key, value, str(error)) from None
 
 
 def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:

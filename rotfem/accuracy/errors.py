@@ -1,18 +1,20 @@
 """The error of an answer: its distance to one in steps of twice the length on half the cells.
 
-Let u_h be an answer in steps or cells of size h, of order p. In the asymptotic range
+Let e be the error of an answer, q e that of the coarser one, and d their distance. Where errors have one sign
 
-    |u_h − u| = |u_h − u_rh| / (rᵖ − 1)
+    e = d / (q − 1),    q = rᵖ
 
-(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4). Both answers differ in steps and mesh, so the
-smallest rᵖ − 1 of both is taken. Of steps p is 2 at most: higher orders are reduced by stiff components (Hairer &
-Wanner 1996, section IV.15); of elements of degree k it is max(2, k), as strains at corners and thin layers are not
-smooth. The error is the whole distance where that range is not shown:
+with r the ratio of their steps or cells and p the order (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993,
+section II.4). That the order holds is shown by a third answer, coarser in the same ratio. With d' its distance to the
+second one, q is d'/d, but at most what theory says. Where q is small, e is at most the larger one of both distances.
 
-- the distance is above `ASYMPTOTIC`;
-- a vibration as quick as the difference d is out of phase by more than π/6, ω (ωh)² T/12 in steps h of second order
-  (Hughes 1987, chapter 9), with ω² = ∫|ḋ|² dt / ∫|d|² dt; or the rows do not resolve it;
-- cells cannot be halved. Then the other answer has elements of one degree less, or of one more where those lock.
+- Of steps p is 2: higher orders are reduced by stiff components (Hairer & Wanner 1996, section IV.15). Vibrations that
+  are out of phase in one of the answers have no order, so without a third answer d is not divided.
+- Of elements of degree k of a beam p is 2k − 1: displacements at nodes and eigenvalues have 2k (Strang & Fix 1973,
+  sections 1.6 and 6.3), one less where tables have kinks. Where a distance is above `ASYMPTOTIC`, or there is no third
+  answer, it is max(2, k), and without both d is not divided.
+- Of plates p is `CORNER`. Above `ASYMPTOTIC`, where the corners of the clamp are not what counts, it is max(2, k).
+- Where cells cannot be halved, the other answer has elements of one degree less, or of one more where those lock.
 
 The error of a theory is the distance of the coarser answer to that of the richest theory.
 """
@@ -20,7 +22,7 @@ The error of a theory is the distance of the coarser answer to that of the riche
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,11 +32,11 @@ from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
 from rotfem.analysis.schemes import LONGEST
 from rotfem.errors import ComputationError, InputError
-from rotfem.results.distance import Series, Spectrum
+from rotfem.results.distance import Distance, Spectrum
 from rotfem.scene import Scene
 
-#: Relative distance of two answers up to which their order is taken to hold; phase error (rad) likewise.
-ASYMPTOTIC, IN_PHASE = 0.1, math.pi / 6
+#: Relative distance of two answers from which their order is seen only in a third one.
+ASYMPTOTIC = 0.1
 
 #: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
 BEYOND = 0.75
@@ -44,6 +46,10 @@ LONGER = 1.5
 
 #: Order of steps that holds for all motions.
 CERTAIN = 2
+
+#: Order of elements of plates: 2λ of stresses r^(λ−1) at a right corner of clamp and free edge, λ = 0.76 for ν = 0.3
+#: (Williams, Journal of Applied Mechanics 19 (1952) 526).
+CORNER = 1.5
 
 #: Loosest tolerance of adaptive steps.
 LOOSEST = 0.5
@@ -72,10 +78,17 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Coarser:
-    """A setting to compare with, and the factor rᵖ − 1 by which the error is smaller than the distance to it."""
+    """A setting to compare with, and at most how many times as large its error is.
+
+    Attributes:
+        setting: it.
+        far: the ratio of their errors where distances are above `ASYMPTOTIC`, or there are only two answers.
+        near: where three answers are nearer.
+    """
 
     setting: Setting
-    factor: float
+    far: float
+    near: float
 
 
 def in_longer_steps(own: Setting, end: float) -> Coarser | None:
@@ -87,38 +100,62 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
     """
     order = order_of(own)
     if own.step is not None:
-        if 2 * own.step > end:
-            return None
-        return Coarser(replace(own, step=2 * own.step), 2.0 ** min(CERTAIN, order) - 1.0)
+        ratio = 2.0 ** min(CERTAIN, order)
+        return Coarser(replace(own, step=2 * own.step), ratio, ratio) if 2 * own.step <= end else None
     assert own.tolerance is not None
     tolerance = min(own.tolerance * 2.0**order, LOOSEST)
     ratio = (tolerance / own.tolerance) ** (1.0 / order)
     longest = min(2.0 * (own.max_step or LONGEST * end), end)
     setting = replace(own, tolerance=tolerance, max_step=longest)
-    return Coarser(setting, ratio**CERTAIN - 1.0) if ratio > 1.1 else None
+    return Coarser(setting, ratio**CERTAIN, ratio**CERTAIN) if ratio > 1.1 else None
 
 
 def on_other_meshes(own: Setting) -> list[Coarser]:
     """Return settings on half the cells, of one degree less, and of one more; elements of degree 1 lock."""
-    degrees = [Coarser(replace(own, degree=own.degree - 1), 1.0)] if own.degree > 2 else []
-    degrees.append(Coarser(replace(own, degree=own.degree + 1), BEYOND))
+    k = own.degree
+    degrees = [Coarser(replace(own, degree=k - 1), 2.0, 2.0)] if k > 2 else []
+    degrees.append(Coarser(replace(own, degree=k + 1), 1.0 + BEYOND, 1.0 + BEYOND))
     if own.elements is None:
         return degrees
+    plate = isinstance(own.elements, tuple)
     cells = own.elements if isinstance(own.elements, tuple) else (own.elements,)
     half = tuple((n + 1) // 2 for n in cells)
     ratio = min(n / m for n, m in zip(cells, half, strict=True))
     elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
-    fewer = [Coarser(replace(own, elements=elements), ratio ** max(2, own.degree) - 1.0)] if ratio >= LONGER else []
+    near = ratio**CORNER if plate else ratio ** max(2, 2 * k - 1)
+    fewer = [Coarser(replace(own, elements=elements), ratio ** max(2, k), near)] if ratio >= LONGER else []
     return [*fewer, *degrees]
 
 
-def coarser(own: Setting, scene: Scene) -> list[Coarser]:
+def coarser(own: Setting, end: float) -> list[Coarser]:
     """Return settings that are coarser in steps and mesh, the best one first; none where steps cannot be longer."""
     meshes = on_other_meshes(own)
-    if not own.moving or scene.time is None:
+    if not own.moving:
         return meshes
-    pairs = [(mesh, in_longer_steps(mesh.setting, scene.time.end)) for mesh in meshes]
-    return [Coarser(both.setting, min(both.factor, mesh.factor)) for mesh, both in pairs if both is not None]
+    pairs = [(mesh, in_longer_steps(mesh.setting, end)) for mesh in meshes]
+    return [
+        Coarser(steps.setting, min(steps.far, mesh.far), min(steps.near, mesh.near))
+        for mesh, steps in pairs
+        if steps is not None
+    ]
+
+
+def by_order(apart: float, before: float | None, other: Coarser) -> float:
+    """Return the error of an answer.
+
+    Args:
+        apart: its distance to the coarser one.
+        before: distance of this one to the next coarser; None without one.
+        other: the coarser setting.
+    """
+    if before is None:
+        unseen = other.setting.moving or apart > ASYMPTOTIC
+        return apart / (min(2.0 if unseen else math.inf, other.far, other.near) - 1.0)
+    if apart == 0.0:
+        return 0.0
+    largest = max(apart, before)
+    q = min(other.far if largest > ASYMPTOTIC else other.near, before / apart)
+    return min(apart / (q - 1.0), largest) if q > 1.0 else largest
 
 
 def finer(own: Setting) -> Setting:
@@ -182,16 +219,19 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         own: the answer.
         parts: whether errors of steps and mesh are wanted one by one.
     """
-    scene, setting, scale = answers.scene, own.setting, own.output.scale
-    if setting.step is not None and answers.times is not None:  # rows at which steps of twice the length end, too
-        answers.times = np.unique(np.append(answers.times[::2], answers.times[-1]))
-    out = Errors({}, scale=scale, each=[None] * len(own.output.values) if isinstance(own.output, Spectrum) else [])
-    if parts and setting.moving and scene.time is not None:
-        longer = in_longer_steps(setting, scene.time.end)
-        _compare(out, "time", answers, own, [] if longer is None else [longer])
-        found = _compare(out, "space", answers, own, on_other_meshes(setting))
-    else:
-        found = _compare(out, "discretisation" if setting.moving else "space", answers, own, coarser(setting, scene))
+    scene, setting = answers.scene, own.setting
+    end = 0.0 if scene.time is None else scene.time.end
+    each = [None] * len(own.output.values) if isinstance(own.output, Spectrum) else []
+    out = Errors({}, scale=own.output.scale, each=each)
+    ways: dict[str, Callable[[Setting], list[Coarser]]] = {"space": on_other_meshes}
+    if setting.moving and parts:
+        ways = {"time": lambda s: [c for c in [in_longer_steps(s, end)] if c is not None], **ways}
+    elif setting.moving:
+        ways = {"discretisation": lambda s: coarser(s, end)}
+    rows = answers.times
+    for name, others in ways.items():
+        answers.times = rows
+        found = _compare(out, name, answers, own, others)
     if (lost := own.outcome.round_off) is not None:
         out.parts["round_off"] = lost
     if not registry.theories[setting.theory].exact:
@@ -199,42 +239,70 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     return out
 
 
-def _compare(out: Errors, name: str, answers: Answers, own: Answer, others: list[Coarser]) -> Answer | None:
+def _compare(
+    out: Errors, name: str, answers: Answers, own: Answer, others: Callable[[Setting], list[Coarser]]
+) -> Answer | None:
     """Add a contribution by the distance to the first of coarser answers that there is; return that."""
-    out.parts[name], found, why = None, None, "there are too few steps to take steps of twice the length"
-    for other in others:
-        found, reason = attempt(answers, other.setting)
-        if found is not None and not has_longer_cells(own, found):
-            found, reason = None, "places that are nodes leave no longer cells"
-        if found is not None:
-            break
-        why = f"{other.setting.words()}: {reason}"
+    out.parts[name] = None
+    found, why = _next(answers, own, others(own.setting))
     if found is None:
         out.unknown.append(f"there is no coarser answer: {why}")
         return None
-    apart = distance(own, found)
+    answer, other = found
+    apart = distance(own, answer)
     if not math.isfinite(apart.size):
         out.unknown.append("nothing moves, where it does with a coarser setting")
-        return found
-    holds = other.factor < 1.0 or (apart.size <= ASYMPTOTIC and in_phase(own, found, answers.scene))
-    error = apart.size / other.factor if holds else apart.size
-    if name != "space" and own.outcome.steps > 0 and found.outcome.steps > FEWER * own.outcome.steps:
-        if own.setting.tolerance is None:
-            out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
-            return found
-        error += own.setting.tolerance  # which bounds the error of the steps by what the controller sums
+        return answer
+    kinks = name != "space" and _as_many_steps(own, answer)
+    if kinks and own.setting.tolerance is None:
+        out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
+        return answer
+    halved = answer.setting.degree == own.setting.degree
+    before: Distance | None = None
+    if halved and (other.near > 2.0 or apart.size > ASYMPTOTIC):
+        third, _ = _next(answers, answer, others(answer.setting)[:1])
+        if third is not None and third[0].setting.degree == own.setting.degree and not _as_many_steps(answer, third[0]):
+            output = answer.output
+            output = replace(output, count=None) if isinstance(output, Spectrum) else output  # to which others are near
+            before = output.apart(third[0].output)
     if isinstance(own.output, Spectrum):
-        each = [float(e / other.factor if e <= ASYMPTOTIC else e) for e in apart.each]
-        out.each, error = each, max(each, default=0.0)
+        last = [None] * len(apart.each) if before is None else before.each[apart.partners]
+        out.each = each = [by_order(float(d), b, other) for d, b in zip(apart.each, last, strict=True)]
+        error = max(each, default=0.0)
+    else:
+        error = by_order(apart.size, None if before is None else before.size, other)
+    if kinks:
+        error += own.setting.tolerance or 0.0  # which bounds the error of the steps by what the controller sums
     out.parts[name], out.at = error, apart.at if out.at is None else out.at
     if name != "time":
         following = finer(own.setting)
-        out.rows = [row(found.setting, apart.size, found.seconds), row(own.setting, error, own.seconds)]
-        if other.factor > 1.0:
-            growth = max(1.0, own.seconds / max(found.seconds, 1e-3))  # of no more than the work: one-off costs
+        out.rows = [row(answer.setting, apart.size, answer.seconds), row(own.setting, error, own.seconds)]
+        if halved:
+            growth = max(1.0, own.seconds / max(answer.seconds, 1e-3))  # of no more than the work: one-off costs
             seconds = min(own.seconds * growth, own.predicted(following))
-            out.rows.append(row(following, error / (other.factor + 1.0), seconds, True))
-    return found
+            out.rows.append(row(following, error / other.far, seconds, True))
+    return answer
+
+
+def _next(answers: Answers, own: Answer, others: list[Coarser]) -> tuple[tuple[Answer, Coarser] | None, str]:
+    """Return the first of coarser answers that there is, with its setting; None and why without one.
+
+    Of fixed steps it has every second row, where longer steps end, too; of modes also those beyond the ones wanted.
+    """
+    why = "there are too few steps to take steps of twice the length"
+    if own.setting.step is not None and answers.times is not None:
+        answers.times = np.unique(np.append(answers.times[::2], answers.times[-1]))
+    for other in others:
+        found, reason = attempt(answers, other.setting)
+        if found is not None and has_longer_cells(own, found):
+            return (found, other), ""
+        why = f"{other.setting.words()}: {reason or 'places that are nodes leave no longer cells'}"
+    return None, why
+
+
+def _as_many_steps(own: Answer, other: Answer) -> bool:
+    """Return whether another answer of a history has too many steps for longer ones."""
+    return own.outcome.steps > 0 and other.outcome.steps > FEWER * own.outcome.steps
 
 
 def has_longer_cells(own: Answer, other: Answer) -> bool:
@@ -255,23 +323,6 @@ def attempt(answers: Answers, setting: Setting) -> tuple[Answer | None, str]:
         return answers(setting), ""
     except (ComputationError, InputError) as error:
         return None, error.what if isinstance(error, ComputationError) else error.allowed
-
-
-def in_phase(own: Answer, other: Answer, scene: Scene) -> bool:
-    """Return whether a vibration as quick as the difference of two answers in fixed steps stays in phase.
-
-    Of adaptive steps it does: what the coarser answer does not resolve is small against the distance to it.
-    """
-    if own.setting.step is None or scene.time is None or not isinstance(own.output, Series):
-        return True
-    change = own.output.difference(other.output)
-    spaces = np.diff(change.times)
-    size = float(np.sum(np.square(change.values[1:]).sum(axis=1) * spaces))
-    if size == 0.0:
-        return True
-    omega = math.sqrt(float(np.sum(np.square(np.diff(change.values, axis=0)).sum(axis=1) / spaces)) / size)
-    late = omega * (omega * own.setting.step) ** 2 * scene.time.end / 12.0
-    return late <= IN_PHASE and omega * float(np.median(spaces)) <= 1.0
 
 
 def exact_theory(scene: Scene) -> str:

@@ -10,9 +10,10 @@ degree can be raised.
 
 The walk takes steps and mesh one rung down at a time, until two answers are near enough. With q the ratio of their
 errors and d their distance, the error of the finer one is d/(q − 1) and that of the coarser one q d/(q − 1). q is the
-ratio of the tolerances, or that of the meshes by their order if it is smaller. SAFETY times that is reported, and as
-many times more as the error of the coarser one has turned out larger than it was reported; above the asymptotic range
-it is SAFETY d. Where the errors of steps and mesh differ by more than EVEN, only the larger one is refined.
+least of the ratio of the tolerances, that of the meshes and that of the numbers of steps, both by their order. SAFETY
+times that is reported, and as many times more as the error of the coarser one has turned out larger than it was
+reported; above the asymptotic range it is SAFETY d. Where the errors of steps and mesh differ by more than EVEN, only
+the larger one is refined.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from typing import Any
 
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
-from rotfem.accuracy.errors import ASYMPTOTIC, FLOOR, Errors, of_theory, row
+from rotfem.accuracy.errors import ASYMPTOTIC, FLOOR, Errors, of_theory, order_of, row
 from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Compiling, Hint, cpu_time
 from rotfem.results.distance import Spectrum
@@ -115,6 +116,16 @@ def ratio_of(coarse: Setting, fine: Setting, plate: bool) -> float:
     return float(min(b / a for a, b in zip(here, there, strict=True)) ** (fine.degree + 1))
 
 
+def more_steps(coarse: Answer, fine: Answer) -> float:
+    """Return the ratio of the errors by the steps that two answers took; infinite without steps.
+
+    Where kinks and rows of tables make the steps it is near 1, whatever the tolerances are.
+    """
+    if coarse.outcome.steps == 0:
+        return math.inf
+    return float((fine.outcome.steps / coarse.outcome.steps) ** order_of(fine.setting))
+
+
 def reduced(apart: float, before: float, q: float) -> float:
     """Return the error of the finer of two answers.
 
@@ -123,8 +134,8 @@ def reduced(apart: float, before: float, q: float) -> float:
         before: error that was reported of the coarser one; infinite if none was.
         q: ratio of their errors.
     """
-    if apart > ASYMPTOTIC:
-        return SAFETY * apart
+    if apart > ASYMPTOTIC or q <= 1.0:
+        return SAFETY * apart if q > 1.0 else math.inf
     return SAFETY * apart / (q - 1.0) * max(1.0, apart * q / (q - 1.0) / max(before, FLOOR))
 
 
@@ -281,7 +292,10 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
                 q = TOLERANCES[before[0][name]] / TOLERANCES[at[name]]
                 if name == "space":
                     q = min(q, ratio_of(before[1].setting, setting, plate))
-                parts[name] = reduced(there.size, reported.get(changed, math.inf), q)
+                shown = more_steps(before[1], answer) if name == "time" else q
+                parts[name] = reduced(there.size, reported.get(changed, math.inf), min(q, shown))
+                if shown < q:  # the tolerance bounds what the controller sums
+                    parts[name] = min(parts[name], there.size + TOLERANCES[at[name]])
             error = max(parts.values())
             reported[changed] = max(parts[name] for name in changed)
             error, errors.at = error if math.isfinite(error) else None, there.at

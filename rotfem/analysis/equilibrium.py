@@ -11,6 +11,7 @@ theories evaluate their forces at every state from strains, whose round-off is a
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,39 +56,34 @@ def steady_state(
     speed, the whole load is applied at once. `notes` receives remarks on the way.
     """
     notes = [] if notes is None else notes
-    growth = LoadFactors(omega)
-    loose = [hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0]
+    loose = ", ".join(hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0)
     if start is not None:
-        try:
-            return counted(system, growth, 1.0, balance(system, growth, 1.0, start, newton), newton)
-        except ComputationError:
-            pass
-    if loose and not system.linear:
-        growth = on_hinges(system, omega, newton)
+        with suppress(ComputationError):
+            return counted(system, omega, balance(system, omega, 1.0, start, newton), newton)
     try:
         if system.linear:
-            return balance(system, growth, 1.0, system.zeros(), newton)
-        return _grown(system, growth, newton, notes)
+            return balance(system, omega, 1.0, system.zeros(), newton)
+        return let_go(system, omega, newton) if loose else _grown(system, omega, newton, notes)
     except ComputationError as error:
-        lost = not system.linear and _compliance_lost(system, growth)
-        if lost and not loose:
-            why = "round-off decides, as axial or shear stiffness outweighs what bends beyond its digits"
-            advice = "stiffnesses closer to each other, or fewer elements"
-            raise ComputationError(f"{error.what}; {why}", error.time, advice) from error
-        if not (loose and (lost or growth.start is None)):
+        if loose:
+            raise ComputationError(
+                f"nothing holds the root's hinge ({loose}): no steady state at {speed_text(omega)}: the load turns it, "
+                f"and no equilibrium was found that it turns to ({error.what})",
+                advice=f"structure.root.{loose.partition(',')[0]}_stiffness, a speed whose tension holds it, "
+                f"or {less(system)}",
+            ) from error
+        if system.linear or not _compliance_lost(system, omega):
             raise
-        raise ComputationError(
-            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {speed_text(omega)}: "
-            "the load turns it, and no equilibrium was found that it turns to",
-            advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
-        ) from error
+        why = "round-off decides, as axial or shear stiffness outweighs what bends beyond its digits"
+        advice = "stiffnesses closer to each other, or fewer elements"
+        raise ComputationError(f"{error.what}; {why}", error.time, advice) from error
 
 
-def _compliance_lost(system: System, growth: LoadFactors) -> bool:
+def _compliance_lost(system: System, omega: float) -> bool:
     """Return whether round-off of the stiffness is all of what the load does to the structure before it grows."""
-    q = growth.begin(system)
-    growth.set(system, 1.0)
-    system.set_state(q)
+    system.count_rotations_from(None)
+    set_load(system, omega, 1.0)
+    system.set_state(system.zeros())
     K, load = system.matrix(1.0, 0.0, 0.0, 1.0), system.residual()
     try:
         return rounded_compliance(system, K, system.local(DirectSolver(K).solve(load))) >= LOST
@@ -95,16 +91,14 @@ def _compliance_lost(system: System, growth: LoadFactors) -> bool:
         return False
 
 
-def _grown(system: System, growth: LoadFactors, newton: Newton, notes: list[str]) -> Array:
+def _grown(system: System, omega: float, newton: Newton, notes: list[str]) -> Array:
     """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory."""
-    found = raised(system, growth, newton)
+    found = raised(system, omega, newton)
     if found.least < REGULAR_SHARE:
-        if _compliance_lost(system, growth):
-            raise ComputationError(
-                f"no steady state at {speed_text(growth.omega)}: steps of the load were cut for ever"
-            )
+        if _compliance_lost(system, omega):
+            raise ComputationError(f"no steady state at {speed_text(omega)}: steps of the load were cut for ever")
         system.count_rotations_from(found.reference)
-        growth.set(system, 1.0)
+        set_load(system, omega, 1.0)
         system.set_state(found.q)
     if found.critical is not None:
         notes.append(f"the stiffness gets a negative eigenvalue at {found.critical:.6g} of the load: a bifurcation")
@@ -216,52 +210,12 @@ class Raised:
     least: float = 1.0
 
 
-@dataclass(frozen=True)
-class LoadFactors:
-    """What grows on the way to an equilibrium: with its share s the square of the speed and the loads, linearly.
-
-    A hinge has no stiffness before the spin is there: then it grows first, and the loads at the full speed.
-
-    Attributes:
-        omega: full speed, rad/s.
-        spin: shares of Ω² at s = 0 and s = 1.
-        load: shares of loads, gravity and base acceleration at s = 0 and s = 1.
-        springs: stiffness of the root's springs (N·m/rad) at s = 0 and s = 1, where that changes.
-        start: the equilibrium at s = 0; undeformed if None.
-    """
-
-    omega: float
-    spin: tuple[float, float] = (0.0, 1.0)
-    load: tuple[float, float] = (0.0, 1.0)
-    springs: tuple[tuple[Any, float, float], ...] = ()
-    start: Raised | None = None
-
-    def speed(self, share: float) -> float:
-        """Return the speed (rad/s) at a share."""
-        part = self.spin[0] + share * (self.spin[1] - self.spin[0])
-        if part < 0.0 and self.omega != 0.0:
-            raise ComputationError("the square of the speed would have to be negative")
-        return float(np.sqrt(max(part, 0.0))) * self.omega
-
-    def set(self, system: System, share: float) -> None:
-        """Write speed, loads and springs of a share into a system."""
-        for constant, first, last in self.springs:
-            constant.value = first + share * (last - first)
-        loads = self.load[0] + share * (self.load[1] - self.load[0])
-        system.set_time(0.0, system.motion.at_speed(self.speed(share)), loads)
-
-    def begin(self, system: System) -> Array:
-        """Return the equilibrium at s = 0, rotations counted as they were there."""
-        system.count_rotations_from(None if self.start is None else self.start.reference)
-        return system.zeros() if self.start is None else self.start.q.copy()
-
-    def where(self, share: float) -> str:
-        """Return a share of the load in words, with its speed where that grows."""
-        speed = f" ({speed_text(self.speed(share), 4)})" if self.omega and self.spin[0] != self.spin[1] else ""
-        return f"{share:.6g} of the load{speed}"
+def set_load(system: System, omega: float, share: float) -> None:
+    """Write a share of the load into a system: of the square of a speed (rad/s), and of loads and gravity."""
+    system.set_time(0.0, system.motion.at_speed(float(np.sqrt(share)) * omega), share)
 
 
-def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
+def raised(system: System, omega: float, newton: Newton) -> Raised:
     """Return the equilibrium at full load, in one step or by halved ones.
 
     Where there are several equilibria, a step may end at any of them. So a step is halved, too, where an increment of
@@ -269,15 +223,16 @@ def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     negative eigenvalue (Sylvester): then it has passed a critical point, or left the path. What remains of that at the
     smallest step is a bifurcation of the path itself, beyond which it is unstable and no further ones are looked for.
     """
-    q, done, share, least = growth.begin(system), 0.0, 1.0, 1.0
+    system.count_rotations_from(None)
+    q, done, share, least = system.zeros(), 0.0, 1.0, 1.0
     reference, critical, before = system.reference, None, None
     while done < 1.0:
         target, afresh = min(1.0, done + share), False
         try:
-            new = balance(system, growth, target, q, newton)
+            new = balance(system, omega, target, q, newton)
             wandered = newton.wandered
             negative = negative_count(system.tangent(1.0, 0.0, 0.0)[0], sure=True) or 0
-            new = counted(system, growth, target, new, newton)
+            new = counted(system, omega, new, newton, target)
         except BeyondReach as error:
             turns = system.structure.turns
             failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
@@ -296,7 +251,7 @@ def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
         share /= 2
         least = min(least, share)
         if share < SMALLEST_SHARE:
-            raise _ended(system, growth, q, done, failure, reference)
+            raise _ended(system, omega, q, done, failure, reference)
         system.count_rotations_from(reference)
         if afresh:
             q = recounted(system, q)
@@ -305,9 +260,7 @@ def raised(system: System, growth: LoadFactors, newton: Newton) -> Raised:
     return Raised(np.asarray(q), reference, critical, least)
 
 
-def _ended(
-    system: System, growth: LoadFactors, q: Array, done: float, failure: str, reference: Any
-) -> ComputationError:
+def _ended(system: System, omega: float, q: Array, done: float, failure: str, reference: Any) -> ComputationError:
     """Return the error of a load that could be raised no further than to a share, with the equilibrium q there."""
     system.count_rotations_from(reference)
     system.set_state(q)
@@ -315,58 +268,63 @@ def _ended(
     why = f"beyond it the structure snaps, or there is none ({failure})"
     if stretch >= 2.0:
         why = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
-    what = f"no steady state at {speed_text(growth.omega)}: the last equilibrium was at {growth.where(done)}; {why}"
+    where = f" ({speed_text(float(np.sqrt(done)) * omega, 4)})" * bool(omega)
+    what = f"no steady state at {speed_text(omega)}: the last equilibrium was at {done:.6g} of the load{where}; {why}"
     return ComputationError(what, advice=less(system))
 
 
-def on_hinges(system: System, omega: float, newton: Newton) -> LoadFactors:
-    """Return how the load of a structure grows whose root is free to turn: from an equilibrium that holds its hinges.
+#: Powers of ten by which springs that hold hinges weaken before they let go, and the smallest step of the power.
+LET_GO, SMALLEST_POWER = 12.0, 1e-2
 
-    At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes, and of loads where
-    nothing spins. So springs hold the root first, and let it go; the loads grow at the full speed.
+
+def let_go(system: System, omega: float, newton: Newton) -> Array:
+    """Return the equilibrium of a structure whose root is free to turn: springs hold its hinges, weaken, and let go.
+
+    At q = 0 a hinge without a spring has no stiffness: it comes of the tension by spin and loads.
     """
     springs = [spring.stiffness for spring in system.structure.springs()]
     given = [float(constant.value) for constant in springs]
-    load = 0.0 if omega else 1.0
 
-    def between(first: float, last: float) -> tuple[tuple[Any, float, float], ...]:
-        return tuple((k, max(own, first), max(own, last)) for k, own in zip(springs, given, strict=True))
-
-    q = LoadFactors(0.0).begin(system)
-    LoadFactors(0.0).set(system, 0.0)
-    system.set_state(q)
-    stiff = float(
-        system.tangent(1.0, 0.0, 0.0)[0].norm(norm_type=3)
-    )  # the largest sum of a row: far above that of a turn
-    try:
-        start = raised(system, LoadFactors(omega, load=(0.0, load), springs=between(stiff, stiff)), newton)
-        turn = float(
-            system.comm.allreduce(np.max(np.abs(start.q[system.structure.hinged_unknowns()]), initial=0.0), MPI.MAX)
-        )
-        soft = min(1.0, turn / 0.1) * stiff  # which lets the root swing by 0.1 rad when they let go
-        start = raised(system, LoadFactors(omega, (1.0, 1.0), (load, load), between(soft, 0.0), start), newton)
-    except ComputationError:
-        return LoadFactors(omega)
-    finally:
+    def hold(stiffness: float) -> None:
         for constant, own in zip(springs, given, strict=True):
-            constant.value = own
-    return LoadFactors(omega, (1.0, 1.0), (load, 1.0), start=start)
+            constant.value = max(own, stiffness)
+
+    system.count_rotations_from(None)
+    set_load(system, omega, 0.0)
+    system.set_state(system.zeros())
+    stiff = float(system.tangent(1.0, 0.0, 0.0)[0].norm(norm_type=3))  # largest sum of a row: far above that of a turn
+    power, step = 0.0, 1.0
+    try:
+        hold(stiff)
+        q = raised(system, omega, newton).q
+        while power < LET_GO:
+            reference, weaker = system.reference, power + step
+            hold(stiff * 10.0**-weaker if weaker < LET_GO else 0.0)
+            try:
+                q = counted(system, omega, balance(system, omega, 1.0, q, newton), newton)
+                power, step = weaker, min(2 * step, 1.0)
+            except ComputationError:
+                step /= 2
+                if step < SMALLEST_POWER:
+                    raise
+                system.count_rotations_from(reference)
+        return q
+    finally:
+        hold(0.0)
 
 
-def counted(system: System, growth: LoadFactors, share: float, q: Array, newton: Newton) -> Array:
+def counted(system: System, omega: float, q: Array, newton: Newton, share: float = 1.0) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again."""
     system.check_reach(q)
     turns = system.structure.turns
     if turns is None or not turns.is_due(q):
         return q
-    return balance(system, growth, share, recounted(system, q), newton)
+    return balance(system, omega, share, recounted(system, q), newton)
 
 
-def balance(
-    system: System, growth: LoadFactors, share: float, guess: Array, newton: Newton, *, checked: bool = True
-) -> Array:
+def balance(system: System, omega: float, share: float, guess: Array, newton: Newton, *, checked: bool = True) -> Array:
     """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads."""
-    growth.set(system, share)
+    set_load(system, omega, share)
     q = guess.copy()
 
     def correction(before: Array | None) -> Array:
@@ -376,7 +334,7 @@ def balance(
     increment = limited(system, q, correction)
     if system.linear:
         if not np.isfinite(increment(True)[0]) or (system.structure.hinges and conditioning(system, q) >= LOST):
-            raise ComputationError(f"no steady state at {speed_text(growth.omega)}: the stiffness is singular")
+            raise ComputationError(f"no steady state at {speed_text(omega)}: the stiffness is singular")
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))

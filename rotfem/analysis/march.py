@@ -111,6 +111,7 @@ class March:
         reached: state that an earlier march has yielded, to go on from.
         observers: called with (old state, new state) after every accepted step or part of one.
         last: what the last solution of a stage says of the next one.
+        parts: steps that were taken, parts of steps counted each.
         substeps, rejected: steps that were halved as Newton failed, and adaptive ones that were rejected.
     """
 
@@ -126,7 +127,7 @@ class March:
         self.system, self.scheme, self.steps, self.newton = system, scheme, steps, newton
         self.reached: State | None = None
         self.observers = list[Observer]()
-        self.substeps = self.rejected = 0
+        self.parts = self.substeps = self.rejected = 0
         self._q, self._v = np.zeros_like(system.q.x.array) if q is None else q, v
         self.last = LastSolution()
 
@@ -173,6 +174,7 @@ class March:
                 yield state
 
     def _observed(self, old: State, new: State) -> None:
+        self.parts += 1
         for observe in self.observers:
             observe(old, new)
 
@@ -183,7 +185,9 @@ class March:
         end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
-        knots = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        signals = self.system.signals
+        found = knots_of(signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        knots = np.unique(np.concatenate([found, *(s.bent for s in signals)]))
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 

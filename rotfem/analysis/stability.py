@@ -23,7 +23,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.analysis.equilibrium import LoadFactors, balance
+from rotfem.analysis.equilibrium import balance
 from rotfem.analysis.modal import GROWTH
 from rotfem.equations.affine import AffineSystem
 from rotfem.equations.compiled import with_all_unknowns
@@ -215,7 +215,7 @@ def constant_stability(system: System, newton: Newton) -> Stability | None:
         return None
     system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
     try:
-        q = balance(system, LoadFactors(speed), 1.0, system.zeros(), newton, checked=False)
+        q = balance(system, speed, 1.0, system.zeros(), newton, checked=False)
         return stability_of(system, q, speed)
     except ComputationError:
         return None

@@ -89,11 +89,13 @@ def knots_of(
 ) -> Array:
     """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
 
-    Steps of second order (not `divided`, see `intervals`) do without those that they resolve.
+    Steps of second order (not `divided`, see `intervals`) do without those that they resolve, others without kinks of
+    rates if these are many.
     """
     for signal in signals:
         find_jumps(signal, times, breakpoints)
-    of_signals = (s.knots if divided else unresolved(s, times) for s in signals)
+    rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
+    of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
     found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
     return found
 

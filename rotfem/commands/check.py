@@ -17,7 +17,7 @@ from rotfem.equations.model import Model, rigid_body
 from rotfem.errors import input_of
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
-from rotfem.results import CheckResult
+from rotfem.results.of_scene import CheckResult
 from rotfem.results.result import Array
 from rotfem.scene import Scene, as_scene
 

@@ -43,7 +43,7 @@ def sweep(
             key, _, values = text.partition("=")
             keys[key.strip()] = values_of(values.strip())
         session.start(f"{scene.stem}: sweep")
-        result = compute(scene, keys, verb, folder.path, jobs=jobs, comm=session.comm, progress=session.bar)
+        result = compute(scene, keys, verb, folder.path, jobs=jobs, progress=session.bar)
         session.finish(result)
 
 

@@ -14,11 +14,10 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from time import monotonic, sleep
+from time import sleep
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rotfem import units
@@ -27,15 +26,9 @@ from rotfem.errors import ComputationError, InputError, OutputError, SceneError,
 from rotfem.listeners import ONE_PROCESS
 
 if TYPE_CHECKING:
-    from rotfem.results import Result
+    from rotfem.results.result import Result
     from rotfem.results.result_set import ResultFolder, Writer
     from rotfem.scene import Scene
-
-#: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
-LONG = 10.0
-
-#: Whether commands run on this process alone, whatever others mpirun has started.
-ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
 
 
 def folded(text: str, at_terminal: bool) -> str:
@@ -71,7 +64,7 @@ class Session:
         with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
             from mpi4py import MPI
 
-            self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
+            self.comm = MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug, self.plots = as_json, quiet, debug, not no_plots
         self.first = self.comm.rank == 0
         self.bar = ProgressBar()
@@ -226,7 +219,7 @@ class Session:
 
 
 class ProgressBar:
-    """Progress on stderr: a bar at a terminal, elsewhere lines of a long computation; nothing where it is not wanted.
+    """Progress on stderr: a bar at a terminal, nothing elsewhere.
 
     Args:
         title: of the computation.
@@ -237,7 +230,6 @@ class ProgressBar:
         self._title, self._wanted = title, wanted
         self._bar: Any = None
         self._log = logging.getLogger("ffcx")  # which says what it does on its way to a library
-        self._started, self._due = monotonic(), LONG
 
     def start(self) -> None:
         """Draw the bar, which moves by itself until there is progress; it says so when equations are compiled."""
@@ -279,11 +271,6 @@ class ProgressBar:
             print(folded(line, sys.stderr.isatty()), file=sys.stderr, flush=True)
 
     def __call__(self, share: float) -> None:
-        """Take note of the share of the work that is done: in the bar, or in lines at doubled times."""
+        """Show the share of the work that is done."""
         if self._bar is not None and share > 0.0:
             self._bar.update(0, description=self._title, total=1.0, completed=share, percent=f"{100 * share:3.0f} %")
-        now = monotonic() - self._started
-        if self._bar is None and self._wanted and now >= self._due and 0.0 < share < 1.0:
-            self._due = 2 * now
-            left = now * (1.0 / share - 1.0)
-            self.print(f"{self._title}: {100 * share:.3g} % after {now:.0f} s, about {left:.3g} s to go")

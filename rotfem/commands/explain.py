@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
@@ -38,11 +37,9 @@ from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory, theories
-from rotfem.numerics import forms
-from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.results import ExplainResult
 from rotfem.results.distance import Series, Spectrum
+from rotfem.results.of_scene import ExplainResult
 from rotfem.scene import Scene, as_scene
 
 Array = npt.NDArray[Any]
@@ -75,7 +72,6 @@ ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": 
 def explain(
     scene: Scene | str | Path | Mapping[str, Any],
     *,
-    check: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
     terms: Mapping[str, Work] | None = None,
@@ -84,7 +80,6 @@ def explain(
 
     Args:
         scene: scene, path of a scene file, or nested tables.
-        check: also compute every change with the scene's own mesh and steps, next to the estimate.
         comm: MPI communicator; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
         terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
@@ -95,7 +90,7 @@ def explain(
     scene = as_scene(scene)
     with input_of(scene.file):
         of = Explanation(scene, terms or {}, comm)
-        return of.result(check, progress or (lambda share: None))
+        return of.result(progress or (lambda share: None))
 
 
 def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:
@@ -116,7 +111,6 @@ class Change:
         estimate: output ↦ relative change; infinite where the other model fails, None where it is unknown.
         notes: output ↦ why a model fails.
         refused: why the scene cannot have it; "" if it can.
-        truth: output ↦ relative change in the scene's own setting, where that was asked for.
     """
 
     kind: str
@@ -125,7 +119,6 @@ class Change:
     estimate: dict[str, float | None] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     refused: str = ""
-    truth: dict[str, float] = field(default_factory=dict)
 
     def of(self, own: Setting) -> Setting:
         """Return a setting of the own model with this change."""
@@ -275,25 +268,23 @@ class Explanation:
         return problem, self._switched(problem), Newton.of(variant.solver)
 
     def _history(self, variant: Scene, times: Array | None) -> Output:
-        """Return the tip at all steps, and the largest displacement over the length, or rotation in rad."""
+        """Return the tip at all steps."""
         (problem, system, newton), time = self._of(variant), variant.time
         assert time is not None
         start = with_plain_tangents(system, lambda: first_state(variant, problem, system, judged=False))
-        t, tips, largest = list[float](), list[Array](), 0.0
+        t, tips = list[float](), list[Array]()
         for state in March(system, scheme_of(time), Steps.of(time), newton, start.q, start.v):
-            size = float(system.size(state.q))
-            largest = max(largest, size)
             t.append(state.t)
             tips.append(tip(system, state))
-            if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
+            if system.linear and not system.size(state.q) <= LARGEST_LINEAR_DEFLECTION:
                 raise ComputationError(f"it diverges at t = {state.t:.4g} s")
-        return Output(Series(np.array(t), np.array(tips)), len(t) - 1, largest)
+        return Output(Series(np.array(t), np.array(tips)), len(t) - 1)
 
     def _steady(self, variant: Scene, times: Array | None) -> Output:
         problem, system, newton = self._of(variant)
         q = with_plain_tangents(system, lambda: steady_state(system, problem.motion.speed(0.0), newton))
         values = tip(system, State.at_rest(system, *system.start(q)))
-        return Output(Series(np.zeros(1), values[None, :]), 0, float(system.size(q)))
+        return Output(Series(np.zeros(1), values[None, :]))
 
     def _modes(self, variant: Scene, times: Array | None) -> Output:
         """Return the eigenvalues by size, without a rigid body, of an overdamped mode the slow one."""
@@ -330,18 +321,6 @@ class Explanation:
                     change.refused, change.estimate[output] = failure.allowed, None
                 progress((i + (j + 1) / len(self.changes)) / len(self.answers))
 
-    def check(self, progress: Progress) -> None:
-        """Compute every change in the scene's own setting, too."""
-        there = [change for change in self.changes if not change.refused]
-        for output, answers in self.answers.items():
-            own = self._setting(output)
-            for i, change in enumerate(there, start=1):
-                try:
-                    change.truth[output] = distance(answers(own), answers(change.of(own))).size
-                except ComputationError:
-                    change.truth[output] = np.inf
-                progress(i / len(there))
-
     def needed(self) -> Needed:
         """Return the model that the accuracy calls for; the own one where an output of it cannot be computed.
 
@@ -376,16 +355,11 @@ class Explanation:
             out.remove(max(out, key=lambda c: c.worst))
         return own
 
-    def result(self, check: bool, progress: Progress) -> ExplainResult:
+    def result(self, progress: Progress) -> ExplainResult:
         """Return the result of the verb."""
-        started = perf_counter()
+        started, theory = perf_counter(), self.problem.theory
         self.compute(progress)
         model = self.needed()
-        spent = {"estimate": perf_counter() - started, "check": 0.0}
-        if check:
-            self.check(progress)
-            spent["check"] = perf_counter() - started - spent["estimate"]
-        numbers, theory = groups(self), self.problem.theory
         warnings = [f"{output} of {theory.name} cannot be computed: {what}" for output, what in self.failed.items()]
         if MODES in self.answers:
             warnings += [f"modes: {line}" for line in frozen_inputs(self.problem)]
@@ -397,8 +371,6 @@ class Explanation:
             **summary("explain", self.given, self.comm, self.inner),
             "theory": theory.name,
             "effects": list(self.own.effects or ()),
-            "groups": numbers,
-            "meaning": {name: MEANING[name] for name in numbers},
             "outputs": list(self.answers),
             "resolution": RESOLVED,
             "absent_outputs": self.absent,
@@ -407,18 +379,17 @@ class Explanation:
             "needed": {key: list(x) if isinstance(x, tuple) else x for key, x in asdict(model).items()},
             "speeds": [self.speed],
             "warnings": warnings,
-            "timings": {**spent, "total": sum(spent.values())},
+            "timings": {"total": perf_counter() - started},
         }
         return ExplainResult(found, rows)
 
 
 @dataclass(frozen=True)
 class Output:
-    """An outcome that is an output and no more, with the largest displacement over the length, or rotation in rad."""
+    """An outcome that is an output and no more."""
 
     output: Any
     steps: int = 0
-    size: float = 0.0
 
 
 def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
@@ -441,7 +412,7 @@ def with_plain_tangents(system: System, compute: Callable[[], T]) -> T:
 def settings(own: Setting) -> Iterator[Setting]:
     """Yield settings from the coarsest on: half the cells, the scene's own, twice them where nothing moves."""
     coarse = on_other_meshes(own)[0]
-    first = own if coarse.factor < 1.0 else coarse.setting
+    first = own if coarse.setting.degree > own.degree else coarse.setting
     if not own.moving:
         yield from dict.fromkeys((first, own, finer(own)))
         return
@@ -480,68 +451,3 @@ def compared(answers: Answers, own: Setting) -> tuple[Answer, float]:
         answer = answers(replace(answer.setting, tolerance=None, step=step))
         apart = max(apart, distance(fine, answer).size)
     return answer, apart
-
-
-# --- dimensionless numbers --------------------------------------------------------------------------------------------
-
-#: What each number is, in words and symbols.
-MEANING = {
-    "speed_ratio": "Ω/ω₁, largest speed to first frequency at rest",
-    "slenderness": "L/r, length to radius of gyration of the section at the clamp",
-    "deflection": "largest tip displacement/L",
-    "rotation": "largest displacement/L or rotation in rad",
-    "hub_ratio": "R/L, hub radius to length",
-    "spin_rate_change": "largest |dΩ/dt|/ω₁²",
-    "damping": "ζ, damping ratio of the first mode",
-    "tip_mass_ratio": "tip (or other added) mass/mass of the structure",
-    "steps_per_period": "time steps per period of the last of modes.count modes",
-}
-
-
-def groups(of: Explanation) -> dict[str, float]:
-    """Return name ↦ number, those that a case has; `MEANING` says what they are."""
-    system, time, problem = of._switched(of.problem), of.scene.time, of.problem
-    structure, out = problem.structure, dict[str, float]()
-    length = float(getattr(structure, "length", None) or system.structure.length)  # a mesh file has none
-    at_rest = _frequencies_at_rest(system, of.scene.modes.count)
-    values = of.whole[MODES][0].output.values if MODES in of.whole else 1j * at_rest
-    first = float(at_rest[0]) if at_rest.size else 0.0
-    speeds, rates = of.turning
-    if first > 0.0:
-        out["speed_ratio"] = float(np.abs(speeds).max()) / first
-    if system.structure.radius > 0.0:
-        out["slenderness"] = length / system.structure.radius
-    if tips := of.whole.get(HISTORY) or of.whole.get(STEADY):
-        found: Any = tips[0].outcome
-        out |= {"deflection": found.output.scale / length, "rotation": found.size}
-    root = getattr(structure, "root_position", structure.hub_radius)
-    out["hub_ratio"] = float(np.linalg.norm(root)) / length
-    if first > 0.0:
-        out["spin_rate_change"] = float(np.abs(rates).max()) / first**2
-    if np.any(values[:1]) and not structure.damping.is_zero:
-        out["damping"] = float(-values[0].real / abs(values[0]))
-    if structure.has_tip_mass:
-        out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
-    if time is not None and time.step is not None and len(values):
-        out["steps_per_period"] = 2 * np.pi / float(np.abs(values).max()) / time.step
-    return out
-
-
-def _frequencies_at_rest(system: System, count: int) -> Array:
-    """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
-    system.set_time(0.0, system.motion.at_speed(0.0))
-    system.set_state(system.zeros())
-    try:
-        return np.sort(np.abs(Pencil(*system.mass_damping_stiffness()).solve(max(2, count)).resolved))
-    except ComputationError:
-        return np.empty(0)
-
-
-def _added_mass(system: System, effect: str) -> float:
-    """Return the masses that an effect brings, as a share of the mass of the structure without them."""
-    switch, bodies = system.structure.constant(1.0), system.structure.bodies((effect,))
-    parts = [(switch if b.effect == effect else 1.0) * b.density * b.measure for b in bodies if b.is_position]
-    mass, totals = forms.form(sum(parts), once=True), list[float]()
-    for switch.value in (1.0, 0.0):
-        totals.append(system.comm.allreduce(float(fem.assemble_scalar(mass))))
-    return totals[0] / totals[1] - 1.0

@@ -19,8 +19,6 @@ from rotfem.results.surfaces import HALF_WIDTH, Surface
 from rotfem.scene.values import evaluate
 
 Array = npt.NDArray[np.float64]
-#: Names, and values (nodes, names) at times.
-Named = tuple[tuple[str, ...], list[tuple[float, Array]]]
 Writer = Callable[[Path], list[Path]]
 
 
@@ -32,22 +30,22 @@ class Snapshots:
     """States of a history at ever wider intervals, so that there are never more than MOST_STATES."""
 
     def __init__(self) -> None:
-        self.kept: list[tuple[float, Array]] = []
+        self.kept: list[tuple[float, Array, Array | None]] = []
         self._every, self._count = 1, 0
 
-    def add(self, t: float, q: Array) -> None:
-        """Keep a copy of the local dof array q at time t (s), or pass it by."""
+    def add(self, t: float, q: Array, more: Array | None = None) -> None:
+        """Keep a copy of the local dof array q at time t (s), and more values (nodes, names), or pass it by."""
         if self._count % self._every == 0:
-            self.kept.append((t, q.copy()))
+            self.kept.append((t, q.copy(), more))
             if len(self.kept) > MOST_STATES:
                 self.kept, self._every = self.kept[::2], 2 * self._every
         self._count += 1
 
 
-def fields_writer(system: System, states: list[tuple[float, Array]], more: Named | None = None) -> Writer:
+def fields_writer(system: System, snapshots: Snapshots, names: tuple[str, ...]) -> Writer:
     """Return what writes fields.xdmf and fields.h5 of a run into a folder, on all ranks together.
 
-    States are (time in s, local dof array); `more` has further fields at the same times.
+    Names are those of the further values of its snapshots.
     """
     structure = system.structure
 
@@ -57,11 +55,10 @@ def fields_writer(system: System, states: list[tuple[float, Array]], more: Named
 
     def write(folder: Path) -> list[Path]:
         """Gather the displacements, and write them on rank 0."""
-        frames = [(t, {"displacement": displacement(t, q)}) for t, q in states]
-        if more is not None:
-            names, further = more
-            for (_, fields), (_, values) in zip(frames, further, strict=True):
-                fields.update(zip(names, values.T, strict=True))
+        frames = [
+            (t, {"displacement": displacement(t, q)} | ({} if more is None else dict(zip(names, more.T, strict=True))))
+            for t, q, more in snapshots.kept
+        ]
         points = structure.places(structure.nodes(system.zeros())[0])
         surface = structure.surface()
         cells = chain(len(points)) if surface is None else surface

@@ -6,8 +6,8 @@ from typing import Any
 
 from rotfem.accuracy.answer import Setting
 from rotfem.accuracy.errors import error_line, percent, table_lines
-from rotfem.results import Result
 from rotfem.results.columns import ShownUnits
+from rotfem.results.result import Result
 
 #: Rows of the table of `cost` that is printed in full.
 LONGEST_TABLE = 40

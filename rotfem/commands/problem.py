@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, cast
 
@@ -22,15 +21,14 @@ from rotfem.equations.system import System
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
-from rotfem.mechanics.loads import Loads, load_of
+from rotfem.mechanics.loads import load_of
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.loads import LoadsTable
 from rotfem.scene.settings import estimates_error
 from rotfem.units import si
 from rotfem.users_functions import number_of
@@ -144,13 +142,6 @@ def first_shape(system: System, start: Array | Moment | None) -> Array | None:
 class Problem(ProblemData):
     """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`); `loads` as `rotfem.Loads`."""
 
-    def __post_init__(self) -> None:
-        given: Any = self.loads
-        if isinstance(given, LoadsTable):
-            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
-            object.__setattr__(self, "loads", made)
-        super().__post_init__()
-
     @classmethod
     def of(
         cls,
@@ -174,14 +165,13 @@ class Problem(ProblemData):
         if twice := [name for name in outputs or {} if name in wanted]:
             raise SceneError(scene.file, "output.quantities", twice[0], "is the name of an output of the call, too")
         with input_of(scene.file):
-            motion = motion_of(scene)
             return cls(
                 structure=scene.structure,
-                motion=motion,
+                motion=motion_of(scene),
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=scene.model.effects if isinstance(scene.model.effects, tuple) else None,
-                loads=Loads.of(scene.loads, scene.structure, motion.angle).pitched(motion.pitch),
+                loads=cast(Any, scene.loads),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,
                 terms=terms or {},
@@ -281,7 +271,7 @@ class Problem(ProblemData):
         problem = self.spinning() if speed != 0.0 else self
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
-        return mode_tables(analysis, speed, count)
+        return mode_tables(analysis, analysis.at(speed, count), count)
 
     def _speed(self, speed: float | str | None) -> float:
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")
@@ -300,8 +290,6 @@ def motion_of(scene: Scene) -> Motion:
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
     motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, "base": base, **more})
-    if base is not None and not base.constant:
-        motion = replace(motion, constant=False)
     return with_pitch(scene, motion) if scene.structure.pitches else motion
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -39,7 +39,6 @@ class Log:
     Attributes:
         started, began: `perf_counter()` then, and CPU time without compilation, s.
         steps: number of the last step.
-        parts: steps that were taken, parts of steps counted each.
         elapsed, cpu: time and CPU time that it had taken before it went on from a checkpoint, s.
         warnings, advice: texts.
         resumed: time (s) and number of ranks of every checkpoint that it went on from.
@@ -48,7 +47,6 @@ class Log:
     started: float = field(default_factory=perf_counter)
     began: float = field(default_factory=computing)
     steps: int = 0
-    parts: int = 0
     elapsed: float = 0.0
     cpu: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -153,8 +151,7 @@ class ResultantRows:
     """Takes the states of the rows of a history of a plate, its hub held, and keeps named resultants.
 
     Attributes:
-        frames: values (nodes, names) at the times of the fields' snapshots, which the recorder adds.
-        last: at the last row.
+        last: values (nodes, names) at the last row.
         largest: largest equivalent stress (Pa) so far, where, and when: value, x, y (m), t (s).
     """
 
@@ -164,7 +161,6 @@ class ResultantRows:
         self._nodes = system.structure.nodes(system.zeros())[0]
         self._columns = [self._resultants.names.index(name) for name in names]
         self._stress = self._resultants.names.index(STRESS)
-        self.frames = Snapshots()
         self.last: Array | None = None
         self.largest: tuple[float, ...] = ()
 
@@ -255,11 +251,7 @@ class Recorder:
         self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:
-        """Add a row for a state."""
-        self.add(self.row(state), state)
-
-    def row(self, state: State) -> list[float]:
-        """Return the row of a state; stations and plates keep what they have of it."""
+        """Add a row for a state; stations and plates keep what they have of it."""
         system, t = self.system, state.t
         system.set_time(t)
         write_state(system, state)
@@ -273,18 +265,13 @@ class Recorder:
         row += system.outputs().values()
         if self.stations is not None:
             self.stations(t)
-        return row if self.resultants is None else [*row, self.resultants(t)]
-
-    def add(self, row: Sequence[float], state: State) -> None:
-        """Add a row, and keep the state that it is of."""
+        row += [] if self.resultants is None else [self.resultants(t)]
         if not math.isfinite(sum(row)):
-            check_finite(zip(self.history.columns, row, strict=True), row[0])
+            check_finite(zip(self.history.columns, row, strict=True), t)
         self.history.append(row)
         self._last = state
         if self.snapshots is not None:
-            self.snapshots.add(state.t, state.q)
-            if self.resultants is not None and self.resultants.last is not None:
-                self.resultants.frames.add(state.t, self.resultants.last)
+            self.snapshots.add(state.t, state.q, None if self.resultants is None else self.resultants.last)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""
@@ -298,8 +285,8 @@ class Recorder:
         if self.stations is not None:
             out.stations = self.stations.result()
         if self.snapshots is not None and self.snapshots.kept:
-            more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
-            out.fields = fields_writer(self.system, self.snapshots.kept, more)
+            names = () if self.resultants is None else self.resultants.names
+            out.fields = fields_writer(self.system, self.snapshots, names)
         if self.resultants is not None:
             out.resultants = self.resultants.columns()
         return out

@@ -1,4 +1,4 @@
-"""`rotfem sweep`: a verb over a grid of scene keys, on one or several processes or ranks; a killed sweep goes on.
+"""`rotfem sweep`: a verb over a grid of scene keys, on one or several processes; a killed sweep goes on.
 
 Every point has a folder of its own, named after all that its result depends on, with the result as the verb writes it.
 A point whose summary says done or failed is not computed again. The table sweep.csv grows with them.
@@ -25,13 +25,10 @@ import click
 import numpy as np
 import typer
 from mpi4py import MPI
-from mpi4py.futures import MPICommExecutor
 
-import rotfem.numerics  # noqa: F401  starts PETSc, which all ranks do together
-from rotfem.commands.console import ALONE
 from rotfem.commands.verbs import app
 from rotfem.errors import ComputationError, InputError, OutputError
-from rotfem.listeners import Progress
+from rotfem.listeners import ONE_PROCESS, Progress
 from rotfem.results.files import write_text
 from rotfem.results.result_set import ResultFolder, read_summary
 from rotfem.results.sweep import SweepResult, quantities
@@ -98,38 +95,32 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
 
 
 def settle(point: Point, scene: Path, verb: Sequence[str], files: Sequence[Path] = ()) -> dict[str, Any]:
-    """Return the row of a point after the verb was run there in this process, alone, with what files register."""
+    """Return the row of a point after the verb was run there in this process, with what files register."""
     for file in files:
         load(str(file), file, "sweep", "--load")
     changes = [part for change in point.changes for part in ("--set", change)]
     given = [*verb[:1], str(scene), *verb[1:], *changes, "-o", str(point.folder), "-q", "--no-plots", "--debug"]
-    token, reason = ALONE.set(True), ""
+    reason = ""
     try:
         app(given, prog_name="rotfem", standalone_mode=False)
     except (ComputationError, InputError) as error:
         reason = str(error)
-    finally:
-        ALONE.reset(token)
     return point.row(reason)
 
 
 def rows_of(
-    points: Sequence[Point], scene: Path, verb: Sequence[str], jobs: int, comm: MPI.Comm
+    points: Sequence[Point], scene: Path, verb: Sequence[str], jobs: int
 ) -> Iterator[tuple[Point, dict[str, Any]]]:
-    """Yield points with their rows as they are settled, on several ranks on the first of them alone."""
-    if not points or jobs == comm.size == 1:
+    """Yield points with their rows as they are settled."""
+    if jobs == 1:
         yield from ((point, settle(point, scene, verb)) for point in points)
         return
-    spawned = multiprocessing.get_context("spawn")
-    ranks: Any = comm
-    several: Any = MPICommExecutor(ranks) if comm.size > 1 else ProcessPoolExecutor(jobs, spawned, end_with_parent)
-    with several as pool:
-        tasks = {} if pool is None else {pool.submit(settle, p, scene, verb, loaded()): p for p in points}
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), end_with_parent) as pool:
+        tasks = {pool.submit(settle, point, scene, verb, loaded()): point for point in points}
         try:
             yield from ((tasks[task], task.result()) for task in as_completed(tasks))
         finally:
-            for task in tasks:
-                task.cancel()
+            pool.shutdown(cancel_futures=True)
 
 
 def end_with_parent() -> None:
@@ -145,7 +136,6 @@ def sweep(
     folder: str | Path,
     *,
     jobs: int = 1,
-    comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
 ) -> SweepResult:
     """Return what a verb gives for all combinations of values of scene keys. Settled points are not computed again.
@@ -156,7 +146,6 @@ def sweep(
         verb: its name and options as on the command line, such as `["campbell", "--speeds", "0:10:11"]`.
         folder: where every point has its results, in `points`, and the table grows.
         jobs: processes that compute; where there are several, a script guards itself by `if __name__ == "__main__"`.
-        comm: ranks that compute, each alone; of several the first one hands out the points.
         progress: called with the share of the points done, between 0 and 1.
 
     Raises:
@@ -181,15 +170,15 @@ def sweep(
         counts = {"points": len(points), "failed": len(reasons), "seconds": sum(row["seconds"] for row in there)}
         return SweepResult({**of_all, **counts, "warnings": warnings, "versions": versions()}, there)
 
-    with ResultFolder(comm, folder, "sweep", [scene]) as results:
+    with ResultFolder(ONE_PROCESS, folder, "sweep", [scene]) as results:
         results.begin()
-        for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs, comm):
+        for point, row in rows_of([p for p in points if p.folder not in rows], scene, verb, jobs):
             rows[point.folder] = row
-            with suppress(OutputError):  # which the last table raises on all ranks
+            with suppress(OutputError):  # which the last table raises
                 write_text(folder / "sweep.csv", result().texts()["sweep.csv"])
             if progress is not None:
                 progress(len(rows) / len(points))
-        found: SweepResult = comm.bcast(result() if comm.rank == 0 else None)
+        found = result()
         results.publish(found.texts())
         results.summarise(found.summary)
         return found
@@ -197,6 +186,8 @@ def sweep(
 
 def check_asked(keys: Mapping[str, Sequence[Any]], verb: Sequence[str]) -> None:
     """Refuse what cannot be swept, before anything is computed."""
+    if MPI.COMM_WORLD.size > 1:
+        raise InputError("sweep", None, "runs without mpirun; -j N shares out its points among N processes")
     if not verb or verb[0] not in VERBS:
         raise InputError("sweep", " ".join(verb), f"needs -- and a verb after it: {', '.join(VERBS)}")
     if max(map(len, keys.values()), default=0) < 2 or not all(keys.values()):

@@ -265,6 +265,12 @@ def campbell(
     only: Annotated[
         bool, typer.Option("--only", help="solve no other speeds; critical speeds are interpolated between them")
     ] = False,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--map", metavar="KEY=RANGE", help="critical speeds over structure.supports.*.stiffness=1e6:1e9:20"
+        ),
+    ] = None,
 ) -> None:
     """Compute the Campbell diagram and critical speeds of SCENE.
 
@@ -280,6 +286,7 @@ def campbell(
         rated=None if rated is None else listed("--rated", rated, float, 1)[0],
         operating=None if operating is None else listed("--operating", operating.replace(":", ","), float, 2),
         only=only,
+        map=over,
         folder=session.results.path,
         progress=session.bar,
         hint=session.hint,
@@ -352,9 +359,6 @@ def check(session: Session) -> None:
 @verb(computes=False)
 def explain(
     session: Session,
-    check: Annotated[
-        bool, typer.Option("--check", help="run the full models too: true changes next to the estimates")
-    ] = False,
     accuracy: Annotated[
         float | None, typer.Option("--accuracy", help="that the model of --write is for, 1e-2 by default")
     ] = None,
@@ -372,7 +376,7 @@ def explain(
     if write is not None:
         session.check_writable("--write", write, session.scene.inputs)
     scene = session.scene if accuracy is None else session.scene.replace({"accuracy": accuracy})
-    result = estimate(scene, check=check, comm=session.comm, progress=session.bar)
+    result = estimate(scene, comm=session.comm, progress=session.bar)
     session.finish(result)
     if write is not None and session.first:
         within = result.summary["needed"]["accuracy"]

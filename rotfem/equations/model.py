@@ -26,8 +26,7 @@ from rotfem.mechanics.unbalance import Unbalance
 from rotfem.mechanics.work import Frame, Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
 from rotfem.numerics.forms import added
-from rotfem.registry import resolved
-from rotfem.structures import build
+from rotfem.registry import resolved, structures
 from rotfem.structures.structure import Array, Structure
 from rotfem.users_functions import called
 
@@ -97,7 +96,7 @@ class Model:
         if moving and self.hub is not None:
             self.problem = problem = problem.pushed(self.motion)
             self.reacting = problem.unbalances
-        self.structure: Structure = build(problem, comm)
+        self.structure: Structure = resolved(structures[problem.structure.type].discretised)(problem, comm)
         fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
         self.frame = Frame(
             self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching, problem.frame == "fixed"

@@ -72,11 +72,11 @@ class Motion:
         angle: psi(t) = integral of Omega from 0, in rad.
         axis: unit vector e, frame components.
         base: a_o(t), frame components, m/s^2, as a sum; None: 0.
-        constant: whether Omega and a_o do not change with time.
         is_spinning: whether Omega is anything but zero, as far as is known.
         changes_speed: whether Omega changes, as far as is known.
         knots: times (s) between which Omega is smooth and nearly a polynomial.
-        sharp: those of them at which a derivative of it may jump.
+        sharp: those of them at which it may jump or have a kink.
+        bent: those of them at which its rate has a kink.
         breakpoints: of a function, those that its user named; None if they are searched.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
@@ -91,11 +91,11 @@ class Motion:
     angle: Scalar
     axis: Array
     base: Load | None = None
-    constant: bool = False
     is_spinning: bool = True
     changes_speed: bool = True
     knots: tuple[float, ...] = ()
     sharp: tuple[float, ...] = ()
+    bent: tuple[float, ...] = ()
     breakpoints: tuple[float, ...] | None = None
     smooth: bool = True
     arrays: bool = False
@@ -109,7 +109,7 @@ class Motion:
         """Return steady rotation at a speed (rad/s, or as "12.1 rpm")."""
         speed = si(speed, "rad/s", "motion.speed")
         turning = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
-        state: dict[str, Any] = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
+        state: dict[str, Any] = {"is_spinning": speed != 0.0, "changes_speed": False}
         return cls(*turning, about(axis), **(state | more))
 
     @classmethod
@@ -132,6 +132,7 @@ class Motion:
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
             "sharp": (t[0], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
+            "bent": tuple(t) if kind == "pchip" else (),
             "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))
@@ -169,8 +170,14 @@ class Motion:
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the rotation of a free hub, an unknown; what is prescribed of it is its initial speed."""
-        state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
+        state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "hub": hub}
         return replace(cls.constant_speed(hub.speed, axis), **(state | more))
+
+    @property
+    def constant(self) -> bool:
+        """Whether neither Omega nor a_o nor the pitch changes with time."""
+        turns = self.changes_speed or (self.pitch is not None and self.pitch.changes)
+        return not turns and (self.base is None or self.base.constant)
 
     @property
     def is_accelerated(self) -> bool:
@@ -204,7 +211,7 @@ class Motion:
 
     def pitched(self, pitch: Pitch) -> Motion:
         """Return the motion of a frame that pitches over time too."""
-        return replace(self, pitch=pitch, constant=False)
+        return replace(self, pitch=pitch)
 
     def top_speed(self, end: float | None) -> float:
         """Return the largest |Omega| (rad/s) at knots until a time (s), or ever; 0 of a function and of a free hub."""

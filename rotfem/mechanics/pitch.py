@@ -70,6 +70,7 @@ class Pitch:
         knots: times (s) at which the acceleration may jump.
         known: whether these are all; a function has to be sampled.
         start: θ(0), rad.
+        changes: whether it changes with time.
     """
 
     angle: Scalar
@@ -80,6 +81,7 @@ class Pitch:
     knots: tuple[float, ...] = ()
     known: bool = True
     start: float = 0.0
+    changes: bool = True
 
     @cached_property
     def moves_origin(self) -> bool:
@@ -95,7 +97,7 @@ class Pitch:
     def held(self) -> Pitch:
         """Return the pitch that stays as it is at t = 0."""
         angle, rate, acceleration = constant_pitch(self.start)
-        return replace(self, angle=angle, rate=rate, acceleration=acceleration, knots=(), known=True)
+        return replace(self, angle=angle, rate=rate, acceleration=acceleration, knots=(), known=True, changes=False)
 
     def turned(self, t: float) -> float:
         """Return φ = θ(t) − θ(0), rad."""

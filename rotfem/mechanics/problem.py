@@ -56,7 +56,7 @@ class Problem:
         mesh: elements, degree and integration.
         theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
-        loads: gravity and applied loads, as sums.
+        loads: gravity and applied loads, as sums; may be given as [loads] of a scene (`rotfem.Loads` of a script).
         frame: "rotating"; "fixed", the frame of a round shaft that spins about its own axis; or "inertial" (translates
             with the hub, does not rotate). "auto" becomes "fixed" for such a shaft, else "rotating".
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
@@ -80,6 +80,10 @@ class Problem:
     __repr__ = short_fields
 
     def __post_init__(self) -> None:
+        given: Any = self.loads
+        if not isinstance(given, Loads):
+            made = Loads.of(given, self.structure, self.motion.angle).pitched(self.motion.pitch)
+            object.__setattr__(self, "loads", made)
         if isinstance(self.theory, str):
             if self.theory not in Theory.registry:
                 raise InputError("model.theory", self.theory, f"allowed: {', '.join(Theory.registry.names)}")
@@ -97,9 +101,7 @@ class Problem:
         if self.frame == "rotating":
             self._check_supports()
         if self.frame == "fixed" and not self.is_shaft:
-            why = (
-                "needs a straight spatial_beam that spins about its own axis and is the same in all directions about it"
-            )
+            why = "needs a straight, round spatial_beam that spins about its own axis"
             raise InputError("model.frame", self.frame, why)
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
@@ -146,10 +148,7 @@ class Problem:
         """Refuse bearings that differ by direction where the shaft does, too: periodic coefficients in any frame."""
         standing = [s for s in getattr(self.structure, "supports", ()) if s.frame != "rotating"]
         if abs(self.motion.axis[0]) == 1.0 and self.motion.is_spinning and not all(s.isotropic for s in standing):
-            why = (
-                "differ by direction, and so does the shaft: its equations have periodic coefficients in every frame, "
-                "which are not solved here; make bearings or shaft the same in all directions"
-            )
+            why = "differ by direction, and so does the shaft: periodic coefficients in every frame are not solved"
             raise InputError("structure.supports", None, why)
 
     @property

@@ -76,6 +76,7 @@ class TimeSignal:
         at: time (s) ↦ value, scalar or shape (components,).
         knots: times (s) at which it or its rate may jump, increasing.
         smooth: further times (s) between which it is a polynomial, or nearly one.
+        bent: those of them at which its rate has a kink, which takes two orders from an adaptive step over it.
         many: the same of an array of times, shape (n, components); made of `at` if None.
         known: whether all knots are known; else jumps are searched.
         continuous: whether it must not jump, as speeds and angles.
@@ -86,6 +87,7 @@ class TimeSignal:
     at: Callable[[float], Any]
     knots: Array
     smooth: Array = field(default_factory=lambda: np.empty(0))
+    bent: Array = field(default_factory=lambda: np.empty(0))
     many: Callable[[Array], Array] | None = None
     known: bool = True
     continuous: bool = False
@@ -187,7 +189,8 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
             changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:
-        more = {"smooth": np.array(motion.knots), "known": motion.smooth or motion.breakpoints is not None}
+        more: dict[str, Any] = {"smooth": np.array(motion.knots), "bent": np.array(motion.bent)}
+        more |= {"known": motion.smooth or motion.breakpoints is not None}
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
             signal = see(f"motion.{name}", f, motion.sharp, many=many, continuous=name == "speed", **more)

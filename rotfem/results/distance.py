@@ -24,11 +24,13 @@ class Distance:
         size: largest difference, relative to the largest value (of eigenvalues, to each); infinite if that is 0.
         at: time of the largest difference, s; None of what has no time.
         each: of every eigenvalue, relative to its own size.
+        partners: number of the eigenvalue of the other output that each is compared with.
     """
 
     size: float
     at: float | None = None
     each: Array = field(default_factory=lambda: np.empty(0))
+    partners: Array = field(default_factory=lambda: np.empty(0, dtype=int))
 
 
 @dataclass(frozen=True)
@@ -116,12 +118,12 @@ class Spectrum:
             return Distance(0.0 if len(own) == 0 else np.inf)
         off = np.abs(there[None, :] - own[:, None])
         if self.shapes is None or other.shapes is None:
-            off = off[:, : len(own)].diagonal() if len(there) >= len(own) else np.full(len(own), np.inf)
+            off = np.where(np.eye(len(own), len(there), dtype=bool), off, np.inf)
         else:
             alike = alikeness(self.shapes[: self.count], other.shapes)
-            off = np.where(alike >= 0.9 * alike.max(axis=1, keepdims=True), off, np.inf).min(axis=1)
-        each = off / sizes(own)
-        return Distance(float(each.max()), each=each)
+            off = np.where(alike >= 0.9 * alike.max(axis=1, keepdims=True), off, np.inf)
+        each = off.min(axis=1) / sizes(own)
+        return Distance(float(each.max()), each=each, partners=off.argmin(axis=1))
 
 
 def alikeness(one: Array, other: Array) -> Array:

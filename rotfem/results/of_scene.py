@@ -134,10 +134,10 @@ class ExplainResult(Rows):
     """Outcome of `rotfem explain`.
 
     Attributes:
-        summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
+        summary: scene, changes, the model that it calls for, warnings, timings; JSON-able.
         rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate`
             (output ↦ relative change; None where it is unknown, below `summary["resolution"]` round-off), `worst`,
-            `verdict`; with a check `truth` (output ↦ relative change in the scene's own setting).
+            `verdict`.
     """
 
     index = ("name",)
@@ -171,26 +171,19 @@ class ExplainResult(Rows):
 
     def texts(self) -> dict[str, str]:
         """Return explain.json."""
-        explained = {name: self.summary[name] for name in ("groups", "outputs", "resolution")} | {"rows": self.rows}
+        explained = {name: self.summary[name] for name in ("outputs", "resolution")} | {"rows": self.rows}
         return {"explain.json": json_text(explained)}
 
     def tables(self) -> list[ShortTable]:
-        """Return the dimensionless groups, then how much every effect, theory and discretisation changes the outputs.
-
-        With a check each row is followed by one of the changes as the full models give them.
-        """
-        outputs = self.outputs
-        groups = [(self.summary["meaning"][name], f"{value:.4g}") for name, value in self.summary["groups"].items()]
-        rows = []
+        """Return how much every effect and theory changes the outputs."""
+        outputs, rows = self.outputs, []
         for row in self.rows:
             before = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else ""
             what = before + row["name"] + (" theory" if row["kind"] == "theory" else "")
             cells = [self._change(row, name) for name in outputs]
             rows.append((what, *cells, f"{row['verdict']}: {row['why']}"))
-            if "truth" in row:
-                rows.append(("  by the full models", *(per_cent(row["truth"].get(name)) for name in outputs)))
         head = ("change of", *(f"{name} (%)" for name in outputs), "verdict")
-        return [ShortTable(("of the scene", "value (–)"), groups), ShortTable(head, rows)]
+        return [ShortTable(head, rows)]
 
     def _change(self, row: Row, output: str) -> str:
         """Return an estimate as text; one below the resolution as smaller than that."""
@@ -202,18 +195,16 @@ class ExplainResult(Rows):
         return per_cent(estimate)
 
     def flat_rows(self) -> list[Row]:
-        """Return one row an effect and a theory; changes are columns `estimate_…` and `truth_…`."""
-        rows = []
-        for row in self.rows:
-            flat = {name: row[name] for name in ("name", "kind", "included", "worst", "verdict", "why")}
-            for what in ("estimate", "truth"):
-                flat |= {f"{what}_{output}": value for output, value in row.get(what, {}).items()}
-            rows.append(flat)
-        return rows
+        """Return one row an effect and a theory; changes are columns `estimate_…`."""
+        names = ("name", "kind", "included", "worst", "verdict", "why")
+        return [
+            {name: row[name] for name in names} | {f"estimate_{output}": x for output, x in row["estimate"].items()}
+            for row in self.rows
+        ]
 
 
 def explain_figure(result: ExplainResult) -> Figure:
-    """Return a bar for every effect and theory: relative change of each output; a mark is the true change."""
+    """Return a bar for every effect and theory: relative change of each output."""
     from matplotlib.figure import Figure
 
     rows, outputs = result.rows, result.summary["outputs"]
@@ -232,9 +223,6 @@ def explain_figure(result: ExplainResult) -> Figure:
                 axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
             if not np.isfinite(value):
                 axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
-            if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):
-                truth = max(row["truth"][output], left)
-                axis.plot(truth, at, "k|", ms=9, mew=2, label="both models run" if i == j == 0 else None)
     axis.axvline(1e-2, color="0.4", lw=0.8, ls="--")
     axis.set_xscale("log")
     axis.set_xlim(left, right)

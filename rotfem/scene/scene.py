@@ -207,9 +207,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
-                "step (or tolerance, or neither with accuracy). Only constant motion has a steady state to run "
-                "without it"
+                f'missing; with motion.type = "{self.motion.type}" a run is a history: give end, and step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:

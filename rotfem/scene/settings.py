@@ -264,7 +264,7 @@ class Time(WithParameters):
 
     def _check_steps(self) -> None:
         if (self.step is None) == (self.tolerance is None):
-            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
+            reason = "give step (fixed steps, s) or tolerance (adaptive steps), or neither, and the scene an accuracy"
             raise problem("step", self.step, reason)
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
@@ -320,11 +320,6 @@ Stations = Annotated[
 ]
 
 
-def _as_fields(value: Any) -> tuple[str, ...]:
-    """Return ("xdmf",), or nothing where that is wanted; "vtx", a format of earlier versions, stands for it too."""
-    return ("xdmf",) if as_names(value, ("xdmf", "vtx"), "a format") else ()
-
-
 #: Units in which speeds and frequencies can be printed and drawn.
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
@@ -348,7 +343,7 @@ class OutputTable(SceneModel):
     stations: Stations | None = None
     every: Count = 1
     format: Literal["csv", "netcdf"] = "csv"
-    fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
+    fields: tuple[Literal["xdmf"], ...] = ("xdmf",)
     error: StrictBool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"

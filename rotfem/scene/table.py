@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -48,6 +47,8 @@ def problems_at(key: str, value: Any) -> Iterator[None]:
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
     """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
+    import difflib  # only where something is wrong
+
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f'did you mean "{matches[0]}"? ' if matches else ""
 

@@ -244,9 +244,10 @@ class PlanarBeam(Beam):
         """Return the masses at the tip and along the beam, and their directors."""
         out, q = [], self.k.q
         for name, body, at in self.rigid_bodies():
-            arm = [self.scalar(f"{name}_offset_{j}", c) for j, c in enumerate(body.offset[:2], start=1)]
-            r = self.position(q)
-            x = r + self.turned(q, arm) if any(body.offset) else r
+            x = self.position(q)
+            if any(body.offset):
+                arm = [self.scalar(f"{name}_offset_{j}", c) for j, c in enumerate(body.offset[:2], start=1)]
+                x += self.turned(q, arm)
             if body.mass > 0:
                 out.append(Body(x, self.scalar(f"{name}_mass", body.mass), at, True, "tip_mass"))
             if body.inertia > 0:

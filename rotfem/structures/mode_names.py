@@ -90,8 +90,8 @@ class Wave:
         A shaft's whirl has the direction that the fixed frame sees: forward whirl above its critical speed runs against
         the spin in the rotor. A disk's wave has that in the disk.
         """
-        # A standing mode has orbits that are ellipses of an axial ratio below 1 %.
-        if abs(self.share) < 0.02 or self.number == 0 or speed == 0.0:
+        # A standing mode has orbits that are ellipses of an axial ratio below 1 %. An overdamped one does not whirl.
+        if abs(self.share) < 0.02 or self.number == 0 or speed == 0.0 or (self.fixed and omega == 0.0):
             return ""
         return "forward" if (self.seen_fixed(omega, speed) if self.shaft else self.share) > 0.0 else "backward"
 
@@ -122,21 +122,20 @@ def sign_changes(y: npt.NDArray[np.float64], noise: float = 1e-3) -> int:
 STATIONS, ACROSS = 24, 4
 
 
-def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any]) -> ModeName:
+def plate_mode_name(
+    family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any], disk: Disk | None = None
+) -> ModeName:
     """Return the name of a plate mode.
 
     A plate clamped along an edge has "nth bending" (n − 1 nodal lines across it, none along), "nth torsion" (one line
-    along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk clamped inside "m nodal diameters, s
-    circles", beside the clamp.
+    along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk "m nodal diameters, s circles", beside its
+    clamp.
     """
     real = in_phase(y)
-    x1, x2 = coordinates["x"], coordinates["y"]
-    centre = np.array([np.mean(x1), np.mean(x2)])
-    if _is_disk(x1 - centre[0], x2 - centre[1]):
-        diameters, circles = _polar_lines(x1 - centre[0], x2 - centre[1], real)
-        lines = nodal_lines(diameters, circles)
+    if disk is not None:
+        lines = nodal_lines(*disk.lines(real))
         return ModeName(family, 1, lines if family == "bending" else f"in-plane, {lines}")
-    along, across = _lines(x1, x2, real)
+    along, across = _lines(coordinates["x"], coordinates["y"], real)
     if family != "bending":
         return ModeName(family, across + 1)
     if along > 1:
@@ -144,26 +143,73 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
     return ModeName(("bending", "torsion")[along], across + 1)
 
 
-def disk_wave(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any], axis: float) -> Wave | None:
-    """Return how a mode w e^{iωt} of a disk travels; None of other plates."""
-    x, y = coordinates["x"] - np.mean(coordinates["x"]), coordinates["y"] - np.mean(coordinates["y"])
-    if not _is_disk(x, y):
-        return None
-    with_it, against = (_diameters(x, y, wave)[1] for wave in (w, w.conj()))
-    m = int(np.argmax(with_it + against))
-    total, sense = with_it[m] + against[m], -1.0 if axis < 0.0 else 1.0
-    return Wave(m, float(sense * (with_it[m] - against[m]) / total) if m > 0 and total > 0.0 else 0.0, False)
+#: Differences of the radius of an outline, in parts of the largest one, up to which it is round (a polygon of ten
+#: sides), and up to which it nearly is (one of five).
+ROUND, NEARLY = 0.05, 0.2
 
 
-def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:
-    """Return whether nodes about their centre leave a round hole there and lie at all angles, within 1 rad."""
-    r = np.hypot(x, y)
-    if r.min() < 1e-2 * r.max():
-        return False
-    inner = np.sort(np.arctan2(y, x)[r < 1.02 * r.min() + 1e-3 * r.max()])
-    outer = np.sort(np.arctan2(y, x)[r > 0.98 * r.max()])
-    gaps = [np.max(np.diff(np.append(a, a[0] + 2 * np.pi))) if len(a) > 5 else np.inf for a in (inner, outer)]
-    return max(gaps) < 1.0
+@dataclass(frozen=True)
+class Disk:
+    """The nodes of a round plate.
+
+    Attributes:
+        r: distance from its centre, (n,), m.
+        angle: about it, (n,), rad.
+        area: that a node stands for, (n,), m².
+        off: largest difference of the radius of an outline around the centre, in parts of the largest radius.
+    """
+
+    r: npt.NDArray[np.float64]
+    angle: npt.NDArray[np.float64]
+    area: npt.NDArray[np.float64]
+    off: float
+
+    @classmethod
+    def of(cls, x: npt.NDArray[Any], y: npt.NDArray[Any], triangles: npt.NDArray[np.int64]) -> Disk:
+        """Return the nodes about the centre of the area; outlines around it are the rim and a hole there."""
+        from scipy.sparse import csr_array  # slow to load, and most commands name no mode of a plate
+        from scipy.sparse.csgraph import connected_components
+
+        z = x + 1j * y
+        corners = z[triangles]
+        areas = np.abs(np.imag((corners[:, 1] - corners[:, 0]).conj() * (corners[:, 2] - corners[:, 0]))) / 2
+        z = z - areas @ corners.mean(axis=1) / areas.sum()
+        edges, uses = np.unique(
+            np.sort(np.concatenate([triangles[:, i] for i in ([0, 1], [1, 2], [2, 0])])), axis=0, return_counts=True
+        )
+        ends, n = edges[uses == 1].T, len(z)
+        loop, off = connected_components(csr_array((np.ones(len(ends[0])), ends), (n, n)), directed=False)[1], 0.0
+        for line in (z[ends[0][loop[ends[0]] == i]] for i in np.unique(loop[ends[0]])):
+            angles = np.sort(np.angle(line))
+            if np.max(np.diff(angles, append=angles[0] + 2 * np.pi)) < np.pi:  # else it is a hole elsewhere
+                off = max(off, float(np.ptp(np.abs(line)) / np.max(np.abs(z))))
+        area = np.asarray(np.bincount(triangles.ravel(), np.repeat(areas / 3, 3), n), dtype=np.float64)
+        return cls(np.abs(z), np.angle(z), area, off)
+
+    def parts(self, w: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Return (parts, (rings, m); their squares' sum over the rings, (m,)) of a shape in e^{−imθ}, m ≥ 0."""
+        edges = np.linspace(self.r.min(), self.r.max(), STATIONS // 2 + 1)
+        ring = np.clip(np.digitize(self.r, edges) - 1, 0, STATIONS // 2 - 1)
+        orders = np.arange(16)
+        parts = np.zeros((STATIONS // 2, len(orders)), dtype=complex)
+        for i in np.unique(ring):
+            here = ring == i
+            wave = np.exp(1j * np.outer(orders, self.angle[here]))
+            parts[i] = wave @ (self.area[here] * w[here]) / np.sum(self.area[here])
+        return parts, np.sum(np.abs(parts) ** 2, axis=0)
+
+    def lines(self, w: npt.NDArray[Any]) -> tuple[int, int]:
+        """Return (nodal diameters, nodal circles) of a shape."""
+        parts, squares = self.parts(w)
+        best = int(np.argmax(squares * np.where(np.arange(len(squares)) == 0, 1, 2)))
+        return best, sign_changes(in_phase(parts[:, best]), 0.05)
+
+    def wave(self, w: npt.NDArray[Any], axis: float) -> Wave:
+        """Return how a mode w e^{iωt} travels."""
+        with_it, against = (self.parts(wave)[1] for wave in (w, w.conj()))
+        m = int(np.argmax(with_it + against))
+        total, sense = with_it[m] + against[m], -1.0 if axis < 0.0 else 1.0
+        return Wave(m, float(sense * (with_it[m] - against[m]) / total) if m > 0 and total > 0.0 else 0.0, False)
 
 
 @lru_cache(maxsize=4)
@@ -190,29 +236,6 @@ def _lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tup
     weight = np.sum(parts**2, axis=0) / (2 * np.arange(ACROSS + 1) + 1)
     along = int(np.argmax(weight))
     return along, sign_changes(parts[:, along], 0.02)
-
-
-def _diameters(
-    x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return (parts, (rings, m); their squares' sum over the rings, (m,)) of a shape in e^{−imθ}, m ≥ 0."""
-    r, angle = np.hypot(x, y), np.arctan2(y, x)
-    edges = np.linspace(r.min(), r.max(), STATIONS // 2 + 1)
-    ring = np.clip(np.digitize(r, edges) - 1, 0, STATIONS // 2 - 1)
-    orders = np.arange(16)
-    parts = np.zeros((STATIONS // 2, len(orders)), dtype=complex)
-    for i in range(STATIONS // 2):
-        here = ring == i
-        if np.any(here):
-            parts[i] = np.mean(w[here] * np.exp(1j * np.outer(orders, angle[here])), axis=1)
-    return parts, np.sum(np.abs(parts) ** 2, axis=0)
-
-
-def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
-    """Return (nodal diameters, nodal circles) of a shape on a disk about the origin."""
-    parts, squares = _diameters(x, y, w)
-    best = int(np.argmax(squares * np.where(np.arange(len(squares)) == 0, 1, 2)))
-    return best, sign_changes(in_phase(parts[:, best]), 0.05)
 
 
 # --- names of several modes ---------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
 from rotfem.structures.mesh import PlateGrid, plate_grid
-from rotfem.structures.mode_names import ModeName, Wave, disk_wave, plate_mode_name
+from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.section_fields import field_values
@@ -383,6 +383,24 @@ class Plate(Structure):
         return place[triangles]
 
     @cached_property
+    def _outline(self) -> Disk:
+        x, _ = self.gather(np.zeros(self.V.dofmap.index_map.size_local * self.size))
+        return Disk.of(x[self._order, 0], x[self._order, 1], self.surface())
+
+    @property
+    def disk(self) -> Disk | None:
+        """Nodes of a round plate; None of others."""
+        return self._outline if self._outline.off <= ROUND else None
+
+    @property
+    def doubt(self) -> str:
+        """What is said of a plate that is nearly round; "" of others."""
+        if not ROUND < self._outline.off <= NEARLY:
+            return ""
+        off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
+        return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+
+    @cached_property
     def _order(self) -> npt.NDArray[np.int64]:
         """The permutation that sorts all nodes by x, then y."""
         x, cell = self._points, 1e-7 * self.length  # closer nodes share a coordinate
@@ -390,11 +408,11 @@ class Plate(Structure):
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
-        return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
+        return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk)
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return how a mode travels around a disk; None of other plates."""
-        return disk_wave(coordinates, values[:, 2], axis[2])
+        return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""
@@ -404,9 +422,7 @@ class Plate(Structure):
         tilt = np.abs(q[: self.size * owned].reshape(-1, self.size)[:, 4])
         worst = self.comm.allreduce(float(tilt.max(initial=0.0)), op=MPI.MAX)
         if worst > limit:
-            raise ComputationError(
-                f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {limit}); in the theory "
-                f"{self.problem.theory.name} the director's angles are limited there, not about direction 2",
-                time,
-                f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
+            what = (
+                f"the plate has turned about direction 1 by {worst:.3g} rad; {self.problem.theory.name} ends at {limit}"
             )
+            raise ComputationError(what, time, f'a smaller load, or model.theory = "{richest().name}"')

@@ -48,20 +48,6 @@ from rotfem.structures.structure import Array, PointValues
 AXIS_DEGREE = 5
 
 
-def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
-    """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X."""
-    if not isinstance(sweep, tuple):
-        chi = beam.scalar("sweep", sweep)
-        X = ufl.SpatialCoordinate(beam.mesh)[0]
-        return chi, X * ufl.cos(chi), X * ufl.sin(chi)
-    angle = beam.field("sweep", lambda x, near: line.angles(x, near)[0], 1)
-    position = fem.functionspace(beam.mesh, ("Lagrange", AXIS_DEGREE))
-    along, across = fem.Function(position, name="along"), fem.Function(position, name="across")
-    along.interpolate(lambda p: line.at(p[0])[0][:, 0])
-    across.interpolate(lambda p: line.at(p[0])[0][:, 1])
-    return angle, along, across
-
-
 def curved_axis(beam: Beam, line: Any) -> tuple[Any, Any, Any]:
     """Return (χ, ζ, r): angles of the tangent (rad, see `rotfem.scene.reference_line`) and position (m) over X.
 
@@ -247,16 +233,12 @@ class SpatialBeam(Beam):
             e_2, e_3 = c * e_2 + s * e_3, c * e_3 - s * e_2
         X = ufl.SpatialCoordinate(self.mesh)[0]
         self._axis = X * e_1
-        sweep, line = self.data.sweep, self.data.reference_line
-        if self.data.line is not None:
+        line = self.data.reference_line
+        if line is not None:
             chi, zeta, r = curved_axis(self, line)
             self._axis = r[0] * e_1 + r[1] * e_2 + r[2] * e_3
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
             e_1, e_3 = ufl.cos(zeta) * e_1 + ufl.sin(zeta) * e_3, ufl.cos(zeta) * e_3 - ufl.sin(zeta) * e_1
-        elif sweep != 0.0:
-            chi, along, across = swept_axis(self, sweep, line)
-            self._axis = along * e_1 + across * e_2
-            e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
             angle = self.section["pretwist"] = self.linear_field(
                 "pretwist", lambda x: np.interp(x, *np.array(twist).T), 0

@@ -125,7 +125,7 @@ class SectionForms:
             self._read_central()
             return
         self._stiffness = self._matrix("stiffness")
-        self._read_mass_table() if "mass" in section.tapers else self._read_mass(np.array(section.mass))
+        self._read_mass()
 
     def _read_central(self) -> None:
         beam, data = self._beam, self._data
@@ -176,34 +176,21 @@ class SectionForms:
                     entries[i, j] = beam.section[f"{name}_{i + 1}{j + 1}"] = beam.constant(value)
         return [[entries.get((min(i, j), max(i, j)), 0) for j in range(6)] for i in range(6)]
 
-    def _read_mass(self, M: Array) -> None:
-        """Take a mass matrix that holds along the whole beam."""
-        beam = self._beam
-        m, coupling = M[0, 0], M[:3, 3:]
-        c = np.array([coupling[1, 2] / m, coupling[2, 0] / m, coupling[0, 1] / m])
-        self.mass = beam.section["mass_per_length"] = beam.constant(m)
-        self.mass_center = self._point("mass_center", tuple(c))
-        central = M[3:, 3:] - m * (c @ c * np.eye(3) - np.outer(c, c))
-        self.directors = []
-        for n, (moment, axis) in enumerate(euler_tensor(central), start=1):
-            density = beam.section[f"director_inertia_{n}"] = beam.constant(moment)
-            self.directors.append((tuple(axis), density))
-
-    def _read_mass_table(self) -> None:
-        """Take a table of mass matrices, whose entries are linear between its rows; centres and moments are not.
+    def _read_mass(self) -> None:
+        """Take mass matrices, the entries of a table linear between its rows; centres and moments are not.
 
         ∫ x xᵀ dm = E has the directors t_i with E_ii − Σ_j E_ij and (t_i + t_j)/√2 with 2 E_ij: they do not turn along
         the beam as principal axes do. Those of sections without any thickness along the axis have none in direction 1.
         """
         M = self._matrix("mass")
         self.mass = M[0][0]
-        c = [M[1][5] / self.mass, M[2][3] / self.mass, M[0][4] / self.mass]
+        c: list[Any] = [entry if isinstance(entry, int) else entry / self.mass for entry in (M[1][5], M[2][3], M[0][4])]
         size = ufl.dot(ufl.as_vector(c), ufl.as_vector(c))
         J = [[M[3 + i][3 + j] - self.mass * (size * (i == j) - c[i] * c[j]) for j in range(3)] for i in range(3)]
         half = (J[0][0] + J[1][1] + J[2][2]) / 2
         E = [[half * (i == j) - J[i][j] for j in range(3)] for i in range(3)]
-        pairs, along = moving_moments(self._data.at(sorted({x for x, _ in self._data.mass}))["mass"])
-        self.mass_center = tuple(c) if along else (0, c[1], c[2])
+        pairs, along = moving_moments(self._data.at(self._data.knots)["mass"])
+        self.mass_center = (c[0] if along else 0, c[1], c[2])
         self.directors = []
         for i, j in pairs:
             axis = np.eye(3)[i] if i == j else (np.eye(3)[i] + np.eye(3)[j]) / np.sqrt(2)

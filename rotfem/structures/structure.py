@@ -41,12 +41,8 @@ def check_memory(
     needed = times * 600 * (2.8 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
-        raise InputError(
-            key,
-            value,
-            f"makes {unknowns:.3g} unknowns, which need {needed / 1e9:.3g} GB or more; there are {there / 1e9:.3g} GB: "
-            f"take fewer elements or more machines, or set ROTFEM_MEMORY in the environment to the GB that may be used",
-        )
+        why = f"makes {unknowns:.3g} unknowns, which need {needed / 1e9:.3g} GB or more; there are {there / 1e9:.3g} GB"
+        raise InputError(key, value, f"{why}: take fewer elements, or set ROTFEM_MEMORY to the GB that may be used")
 
 
 def memory() -> float:
@@ -214,12 +210,8 @@ class Structure(Loaded):
             return
         file = getattr(self.data, "mesh", None)
         key, value = ("structure.mesh", shown(file)) if file else ("mesh.elements", self.problem.mesh.elements)
-        raise InputError(
-            key,
-            value,
-            f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes: {idle} would have "
-            "nothing to do; start fewer, or refine it",
-        )
+        why = f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes"
+        raise InputError(key, value, f"{why}: {idle} would have nothing to do; start fewer, or refine it")
 
     def free_unknowns(self) -> int:
         """Return how many unknowns are not clamped, over all processes."""

@@ -179,10 +179,10 @@ def test_killed_and_resumed(folder: Path, rotfem: Any) -> None:
     assert summary("cut")["resumed"] == [{"time": 0.3, "ranks": 1}]
 
 
-def test_an_interrupted_run_goes_on_from_the_step_it_was_in(folder: Path, rotfem: Any) -> None:
-    """By SIGTERM; that SIGINT is the same is in test_cli."""
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGINT"])
+def test_an_interrupted_run_goes_on_from_the_step_it_was_in(name: str, folder: Path, rotfem: Any) -> None:
     assert rotfem("run", "beam.toml", "--no-plots", "-o", "whole").status == 0
-    done = signalled(folder, "SIGTERM", "--checkpoint", "1000s", "-o", "cut")
+    done = signalled(folder, name, "--checkpoint", "1000s", "-o", "cut")
     said = (
         "results until then are in cut; history.csv has 34 rows, up to t = 0.33 s; --resume goes on from its checkpoint"
     )

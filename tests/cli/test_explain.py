@@ -31,15 +31,12 @@ count = 2
 """
 
 
-def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Rotfem) -> None:
+def test_explain_prints_a_row_each(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("explain", "beam.toml")
     assert (done.status, done.err) == (0, "")
-    assert "Ω/ω₁" in done.out
-    assert "L/r" in done.out
     for name in ("without coriolis", "without centrifugal", "without rotary_inertia", "consistent_linear theory"):
         assert name in done.out
     assert "gravity (no gravity)" in done.out
-    assert "by the full models" not in done.out
     assert {f.name for f in (folder / "results" / "beam" / "explain").iterdir()} == {
         "explain.json",
         "explain.png",
@@ -47,17 +44,14 @@ def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Rotfem) -> N
     }
 
 
-def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem) -> None:
-    done = rotfem("explain", "beam.toml", "--check", "--json", "--no-plots", "-o", "out")
+def test_rows_are_in_json_and_in_the_file(folder: Path, rotfem: Rotfem) -> None:
+    done = rotfem("explain", "beam.toml", "--json", "--no-plots", "-o", "out")
     assert done.status == 0, done.err
     summary = json.loads(done.out)
     assert summary["outputs"] == ["steady", "modes"]
-    rows = json.loads((folder / "out" / "explain.json").read_text())["rows"]
-    assert rows == summary["rows"]
-    assert all(set(row["truth"]) == {"steady", "modes"} for row in rows)
+    assert json.loads((folder / "out" / "explain.json").read_text())["rows"] == summary["rows"]
     assert not (folder / "out" / "explain.png").exists()
     assert rotfem("explain", "beam.toml", "-q", "--no-plots", "-o", "out") == (0, "", "")
-    assert "by the full models" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
 
 
 def test_modes_say_that_they_have_all_effects(rotfem: Rotfem) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from rotfem.commands.recorder import Monitor
 from tests.beams import BEAM_TABLE
 from tests.cli.conftest import Done
 from tests.launch import environment
@@ -36,11 +35,6 @@ def _table(folder: Path) -> None:
     (folder / "history.csv").write_text(TABLE)
 
 
-def status(folder: str) -> str:
-    found: str = json.loads(Path(folder, "summary.json").read_text())["status"]
-    return found
-
-
 def test_an_input_is_not_written_over(rotfem: Any) -> None:
     done: Done = rotfem("cost", "beam.toml", "--write", "./history.csv")
     assert (done.status, done.err.count("\n")) == (2, 1)
@@ -54,29 +48,6 @@ def test_a_blade_file_is_not_written_over(rotfem: Any) -> None:
     done: Done = rotfem("import", "link", "-o", "blade.toml", "--format", "beamdyn")
     assert done.status == 2
     assert Path("blade.toml").read_text() == "no blade"
-
-
-def test_a_table_of_an_earlier_run_may_be_read_elsewhere(rotfem: Any) -> None:
-    assert rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--set", "time.end=0.1").status == 0
-    Path("out/history.csv").write_text(TABLE)
-    again = ["--set", "motion.table=out/history.csv", "--set", "time.end=0.1", "--no-plots"]
-    assert rotfem("run", "beam.toml", "-o", "out", *again).status == 2
-    assert rotfem("run", "beam.toml", "-o", "further", *again).status == 0
-    assert Path("out/history.csv").read_text() == TABLE
-
-
-def test_an_error_nobody_foresaw_leaves_the_status_failed(rotfem: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def spoilt(self: Monitor, state: Any) -> None:
-        raise ZeroDivisionError("nobody foresaw it")
-
-    monkeypatch.setattr(Monitor, "step", spoilt)
-    with pytest.raises(ZeroDivisionError):
-        rotfem("run", "beam.toml", "-o", "out")
-    assert status("out") == "failed"
-    done: Done = rotfem("check", "out")
-    assert done.status == 0
-    assert "out: run failed: ZeroDivisionError: nobody foresaw it" in done.out
-    assert json.loads(rotfem("check", "out", "--json").out)["status"] == "failed"
 
 
 #: Runs one command line after another, given as JSON, and writes what comes of each.

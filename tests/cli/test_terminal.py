@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -16,7 +15,6 @@ from typing import NamedTuple
 
 import pytest
 
-from rotfem.commands import console
 from rotfem.commands.cli import app
 from tests import blade_decks
 from tests.launch import environment
@@ -65,7 +63,7 @@ VERBS = {
     "campbell": ("campbell", "blade.toml", "--speeds", "0:60:4rpm"),
     "response": ("response", "arm.toml", "--from", "0.2Hz", "--to", "1Hz", "--number", "20"),
     "check": ("check", "blade.toml"),
-    "explain": ("explain", "blade.toml", "--check"),
+    "explain": ("explain", "blade.toml"),
     "cost": ("cost", "blade.toml", "--quick", "--budget", "60s", "--accuracy", "0.1"),
     "sweep": ("sweep", "blade.toml", "--set", "motion.speed=0:20:2rpm", "--", "modes"),
     "import": ("import", "Blade.st", "-o", "imported.toml"),
@@ -113,9 +111,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def alone(folder: Path) -> Terminal:
-    """Return a function that runs `rotfem …` there as a process; `stop` ends it with SIGINT at a text."""
+    """Return a function that runs `rotfem …` there as a process."""
 
-    def run(*arguments: str, stop: str = "", **more: str) -> Shown:
+    def run(*arguments: str, **more: str) -> Shown:
         began, text, parts = time.monotonic(), "", []
         ours, theirs = os.openpty()
         process = subprocess.Popen(
@@ -125,15 +123,11 @@ def alone(folder: Path) -> Terminal:
             stdin=theirs,
             stdout=theirs,
             stderr=theirs,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )
         os.close(theirs)
         while data := _read(ours):
             text += data
             parts.append((time.monotonic() - began, data))
-            if stop and stop in CONTROL.sub("", text):
-                process.send_signal(signal.SIGINT)
-                stop = ""
         os.close(ours)
         return Shown(text, parts, process.wait(60))
 
@@ -222,25 +216,3 @@ def test_compilation_is_said_with_a_bar_that_moves(alone: Terminal, tmp_path: Pa
     assert frames[-1][0] - frames[0][0] > 0.3 * (whole - frames[0][0]), "it is seen for as long as that takes"
     warm = alone("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
     assert "compiling" not in warm.text
-
-
-def test_an_interrupted_run_says_where_its_results_are(alone: Terminal, folder: Path) -> None:
-    """Ctrl-C once the bar shows a share of the run: a step of 1e-4 s to 20 s takes half a minute."""
-    long = ("--set", "time.end=20.0", "--set", "time.step=1e-4", "--set", "output.error=false", "--no-plots")
-    shown = alone("run", "arm.toml", *long, "-o", "out-cut", stop=" 0 %")
-    assert shown.status == 130
-    said = " ".join(CONTROL.sub("", shown.text).split())
-    assert "rotfem: interrupted; results until then are in out-cut; history.csv has" in said
-    assert (folder / "out-cut" / "history.csv").exists()
-    assert [line for line in shown.lines if len(line) > COLUMNS] == []
-
-
-def test_lines_in_the_place_of_a_bar(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """Where there is no terminal: after ten seconds, then at doubled times, by the pace so far."""
-    now = [0.0]
-    monkeypatch.setattr(console, "monotonic", lambda: now[0])
-    progress = console.ProgressBar("arm", True)
-    for now[0], share in ((8.0, 0.1), (10.0, 0.2), (15.0, 0.3), (30.0, 0.6), (60.0, 1.0)):
-        progress(share)
-    lines = ["arm: 20 % after 10 s, about 40 s to go", "arm: 60 % after 30 s, about 20 s to go"]
-    assert capsys.readouterr().err.splitlines() == lines

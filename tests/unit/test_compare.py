@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from rotfem.errors import InputError
-from rotfem.results import CampbellResult, ModesResult, ResponseResult, RunResult
+from rotfem.results.campbell import CampbellResult
 from rotfem.results.compare import compare
+from rotfem.results.modes import ModesResult, ResponseResult
+from rotfem.results.run import RunResult
 from rotfem.version import __version__
 
 X = np.linspace(0.0, 1.0, 41)

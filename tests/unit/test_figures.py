@@ -10,10 +10,11 @@ from matplotlib.contour import ContourSet
 from matplotlib.tri import Triangulation
 
 from rotfem.along import FORCES, STRAINS
-from rotfem.results import CampbellResult, CheckResult, ModesResult, RunResult
-from rotfem.results.modes import ResponseResult
+from rotfem.results.campbell import CampbellResult
+from rotfem.results.modes import ModesResult, ResponseResult
+from rotfem.results.of_scene import CheckResult
 from rotfem.results.plots_campbell import campbell_figure, spread
-from rotfem.results.run import StationHistory
+from rotfem.results.run import RunResult, StationHistory
 from rotfem.results.surfaces import Surface
 from tests.figures import check
 

@@ -11,8 +11,11 @@ import pytest
 import xarray
 
 from rotfem.errors import OutputError
-from rotfem.results import CampbellResult, CriticalSpeed, Instability, ModesResult, Result, RunResult
+from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
 from rotfem.results.columns import SHORT, Columns, ShortTable, described, label, numbers
+from rotfem.results.modes import ModesResult
+from rotfem.results.result import Result
+from rotfem.results.run import RunResult
 from tests.figures import check
 
 T = np.array([0.0, 0.5, 1.0])

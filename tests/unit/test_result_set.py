@@ -11,9 +11,10 @@ import pytest
 
 from rotfem.errors import OutputError
 from rotfem.listeners import ONE_PROCESS
-from rotfem.results import ModesResult, RunResult
 from rotfem.results.files import Table, csv_text, json_text, read_csv, write_text
+from rotfem.results.modes import ModesResult
 from rotfem.results.result_set import RESULTS, ResultFolder, read_summary, said_of
+from rotfem.results.run import RunResult
 
 
 def run_result(value: float, shape: bool = True) -> RunResult:

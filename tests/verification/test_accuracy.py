@@ -82,6 +82,27 @@ def test_the_truth_is_as_near_as_was_asked(name: str, accuracy: float, of: str) 
     assert found["estimated"] == [row["error"] for row in settings if not row.get("extrapolated")][-1]
 
 
+def test_steps_that_rows_of_a_table_make_are_not_taken_for_those_of_the_tolerance() -> None:
+    """A gust by 101 linear rows: 97 steps to 3e-4, 113 to 5e-5, and so an error that hardly changes."""
+    t = np.linspace(0.0, 5.0, 101)
+    force = 100.0 + 400.0 * ((t > 0.5) & (t < 2.5)) * (1.0 - np.cos(np.pi * (t - 0.5)))
+    scene = {
+        "structure": {
+            **{"type": "spatial_beam", "length": 20.0, "hub_radius": 1.0, "precone": -0.03},
+            "section": {"shape": "rectangle", "width": 1.0, "height": 0.18, "E": 7e10, "nu": 0.3, "rho": 2700.0},
+            "pretwist": [[0, 0.2], [20, 0.0]],
+            "damping": {"kelvin_voigt": 2e-3},
+        },
+        "motion": {"type": "constant", "speed": 2.0},
+        "loads": {"distributed": {"over_time": np.column_stack([t, 0.0 * t, force]).tolist()}},
+    }
+    run = rotfem.run({**scene, "time": {"end": 5.0, "output_step": 0.01}, "accuracy": 1e-4})
+    time = {"end": 5.0, "output_step": 0.01, "tolerance": 1e-6}
+    fine = rotfem.run({**scene, "time": time, "mesh": {"elements": 8, "degree": 5}, "output": {"error": False}})
+    true = output(fine, "tip").apart(output(run, "tip")).size
+    assert 0.5 * true < run.summary["error"]["total"] <= 1e-4
+
+
 def test_rows_are_where_they_were_asked_for() -> None:
     for time in ({"output_step": 0.05}, {"step": 0.01, "output_every": 5}):
         run = rotfem.run({**SCENES["spin-up"], "time": {"end": 1.0, **time}, "accuracy": 1e-2})

@@ -14,7 +14,7 @@ from rotfem import SceneError, campbell, modes
 from rotfem.analysis.branches import AMBIGUOUS, SURE
 from rotfem.commands.campbell import parse_speeds
 from rotfem.errors import Stopped
-from rotfem.results import CampbellResult
+from rotfem.results.campbell import CampbellResult
 
 pytestmark = pytest.mark.estimated
 

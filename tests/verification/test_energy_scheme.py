@@ -15,7 +15,7 @@ import pytest
 
 from rotfem import run
 from rotfem.mechanics.theories import theories
-from rotfem.results import RunResult
+from rotfem.results.run import RunResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 

@@ -77,6 +77,73 @@ def test_the_error_by_steps_and_mesh_is_bounded(structure: Any, loads: Any) -> N
     assert 0.5 * true < run.summary["error"]["total"] < 8 * true
 
 
+STOP = {
+    "structure": {
+        **{"type": "planar_beam", "length": 1.0},
+        "section": {"EA": 1e6, "GA": 326904.0, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 1e-6},
+    },
+    "motion": {"type": "table", "table": [[0, 0.3], [1, 0.3], [1.0001, 0], [3, 0]], "interpolation": "linear"},
+}
+SOFT = {"EA": 5e6, "GA2": 1e10, "GA3": 1e10, "GJ": 1e4, "EI2": 900.0, "EI3": 900.0, "mass_per_length": 1.5}
+RAMP = np.linspace(0.0, 1.5, 301)
+SWING = np.column_stack([RAMP, 60.0 * (RAMP / 1.5) ** 2 * (1.0 - RAMP / 1.5) ** 2])
+LIMP = {
+    "structure": {"type": "spatial_beam", "length": 6.0, "section": {**SOFT, "polar_radius": 0.0}},
+    "motion": {"type": "table", "table": [*SWING.tolist(), [4.0, 0.0]]},
+    "loads": {"gravity": [0, 0, -9.81]},
+}
+HEAVY = {
+    "structure": {**BEAM, "damping": {"kelvin_voigt": 5.0}},
+    "motion": {"type": "constant", "speed": 0.5},
+    "initial": {"tip_displacement": 0.1},
+}
+PLATE = {
+    "structure": {
+        **{"type": "plate", "length": 1.0, "width": 0.6, "thickness": 0.008},
+        **{"E": 7e10, "nu": 0.3, "rho": 2700.0},
+    },
+    "motion": {"type": "constant", "speed": 25.0},
+    "loads": {"tip_force": [0, 0, 80.0]},
+}
+
+
+@pytest.mark.parametrize(
+    ("tables", "time", "true"),
+    [
+        *((STOP, {"end": 3.0, "step": 0.01, "scheme": s}, 3.1e-2) for s in ("newmark", "energy_conserving")),
+        (STOP, {"end": 3.0, "step": 0.005}, 1.3e-2),
+        (LIMP, {"end": 4.0, "step": 0.005}, 1.42e-2),
+        (HEAVY, {"end": 2.0, "step": 0.05}, 1.9e-3),
+        (PLATE, None, 1.06e-4),
+    ],
+    ids=["newmark", "energy", "generalised-alpha", "limp arm", "heavy damping", "corners of a plate"],
+)
+def test_an_order_that_does_not_hold_is_not_believed(tables: Any, time: Any, true: float) -> None:
+    """A hub that stops at once, an arm that coils up, fast decay, corners: between half of the truth and 4 times it.
+
+    The truth is of 1/16 of the steps on finer meshes; that of the stop is in a modal solution, too.
+    """
+    found = rotfem.run({**tables, **({} if time is None else {"time": time})}).summary["error"]["total"]
+    assert 0.5 * true < found < 4.0 * true
+
+
+def test_frequencies_of_a_stepped_shaft() -> None:
+    """Two diameters, a node at the step: frequencies converge with 2k, as three meshes show."""
+    radius = [[0, 0.02], [0.4, 0.02], [0.4, 0.03], [1.0, 0.03]]
+    shaft = {
+        "type": "spatial_beam",
+        "length": 1.0,
+        "root": {"driven": True},
+        "supports": [{"x": x, "stiffness": 1e8} for x in (0.0, 1.0)],
+        "section": {"shape": "circle", "radius": radius, "E": 2e11, "nu": 0.3, "rho": 7800},
+    }
+    scene = {"structure": shaft, "motion": {"type": "constant", "speed": 100.0, "axis": [1, 0, 0]}}
+    own = rotfem.modes({**scene, "mesh": {"elements": 8}})
+    fine = rotfem.modes({**scene, "mesh": {"elements": 32}, "output": {"error": False}})
+    true = float(np.max(np.abs(own.frequencies / fine.frequencies - 1.0)))
+    assert 0.5 * true < own.summary["error"]["total"] < 5.0 * true
+
+
 def test_a_vibration_out_of_phase_has_all_of_its_difference() -> None:
     """Of a second mode in 7 steps a period nothing is divided: in 20 s its phase is off by more than half a period."""
     tables = scene(0.05, initial={"mode": 2, "amplitude": 0.01}, time={"end": 20.0})

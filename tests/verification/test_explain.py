@@ -149,7 +149,7 @@ def test_centrifugal_row_of_a_hinged_rigid_blade() -> None:
 
 
 def test_rows_of_a_blade_whose_hinge_nothing_holds() -> None:
-    """Its zero eigenvalue is round-off, which is not compared with itself, and no group is relative to it.
+    """Its zero eigenvalue is round-off, which is not compared with itself.
 
     Without stress stiffness it is ±Ω.
     """
@@ -159,25 +159,23 @@ def test_rows_of_a_blade_whose_hinge_nothing_holds() -> None:
         found = rotfem.explain(tables | {"motion": {"type": "constant", "speed": speed}})
         rows = {row["name"]: row["estimate"][MODES] for row in found.rows}
         assert {name for name, change in rows.items() if change > 0.03} == changed
-        assert not {"speed_ratio", "spin_rate_change"} & set(found.summary["groups"])
 
 
 def test_rows_are_the_distances_of_two_runs() -> None:
-    """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible."""
-    result = rotfem.explain(scene(SPIN_UP), check=True)
-    compared = 0
-    for row in result.rows:
-        assert set(row["truth"]) == {HISTORY, MODES}
-        for name, truth in row["truth"].items():
-            estimate = row["estimate"][name]
-            if max(truth, estimate) < 1e-8 or min(truth, estimate) == np.inf:
-                continue
-            assert truth / 3 < estimate < 3 * truth, (row["name"], name)
-            compared += 1
-        if max(row["truth"].values()) > NOTICEABLE:
+    """Of histories and of modes, and none above 1 % is called negligible."""
+    own, result = scene(SPIN_UP), rotfem.explain(SPIN_UP)
+    for row in (row for row in result.rows if row["name"] != "linear"):  # which diverges
+        kept = [name for name in result.summary["effects"] if name != row["name"]]
+        changes = {"model.effects": kept} if row["kind"] == "effect" else {"model.theory": row["name"]}
+        changes["output.error"] = False
+        true = {HISTORY: distance(tip(rotfem.run(own)), tip(rotfem.run(own.replace(changes))))}
+        one, other = (rotfem.modes(asked).frequencies for asked in (own, own.replace(changes)))
+        true[MODES] = float(np.max(np.abs(other / one - 1.0)))
+        for name, truth in true.items():
+            assert truth / 3 - 1e-8 <= row["estimate"][name] <= 3 * truth + 1e-8, (row["name"], name)
+        if max(true.values()) > NOTICEABLE:
             assert row["verdict"] != "negligible"
-    assert compared >= 12
-    assert {row["name"] for row in result.rows if row["verdict"] == "large"} >= {"euler"}
+    assert {name for name, verdict in result.verdicts.items() if verdict == "large"} >= {"euler"}
 
 
 def test_change_by_a_theory_is_that_of_spectral_histories() -> None:
@@ -329,10 +327,9 @@ def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> No
     add(Effect("drag", work, reasons=("there is air", "there is no air"), constants=()))
     add(Theory("unstiffened", 0.5, Theory.registry["linear"].strains, linear=True))
     still = scene(SPIN_UP, {"motion": {"type": "constant", "speed": 0.0}, "time": None, "modes.count": 1})
-    result = rotfem.explain(still, check=True)
+    result = rotfem.explain(still)
     row = result.effects["drag"]
     assert row["estimate"][MODES] == pytest.approx(drag / (2 * 1.2 * 3.79773), rel=3e-4)
-    assert row["estimate"][MODES] == pytest.approx(row["truth"][MODES], rel=1e-3)
     assert row["why"].startswith("there is air; ")
     theories = result.theories
     assert list(theories)[:2] == ["linear", "unstiffened"]
@@ -340,19 +337,6 @@ def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> No
     airless = rotfem.explain(still.replace({"model.effects": []}))
     assert not airless.effects["drag"]["included"]
     assert "not in model.effects" in airless.effects["drag"]["why"]
-
-
-def test_groups_of_the_spin_up() -> None:
-    """ω₁ as above; r = √(EI/EA) = 0.02236 m; the largest rate of the spin-up is 2 · speed/duration."""
-    heavy = scene(SPIN_UP, {"structure.tip_mass": 3.0, "structure.hub_radius": 2.0})
-    numbers = rotfem.explain(scene(SPIN_UP)).summary["groups"]
-    assert numbers["speed_ratio"] == pytest.approx(4.0 / 3.79773, rel=3e-4)
-    assert numbers["slenderness"] == pytest.approx(10.0 / np.sqrt(1.4e4 / 2.8e7), rel=1e-12)
-    assert numbers["spin_rate_change"] == pytest.approx(2.0 / 3.79773**2, rel=1e-3)
-    assert "tip_mass_ratio" not in numbers
-    more = rotfem.explain(heavy).summary["groups"]
-    assert more["tip_mass_ratio"] == pytest.approx(0.25, rel=1e-12)
-    assert more["hub_ratio"] == 0.2
 
 
 def test_gravity_that_turns_leaves_the_modes() -> None:

@@ -15,7 +15,7 @@ from rotfem.analysis.sensitivity import sensitivities
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.registry import schemes
-from rotfem.results import ModesResult
+from rotfem.results.modes import ModesResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 

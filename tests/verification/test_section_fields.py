@@ -19,8 +19,8 @@ from numpy.polynomial import legendre
 import rotfem
 from rotfem.commands.advice import advise
 from rotfem.commands.problem import Problem
+from rotfem.equations.model import Model
 from rotfem.scene import Scene
-from rotfem.structures import build
 from rotfem.structures.section_fields import not_negative
 from tests.beams import STRUCTURE
 from tests.plate_mesh_files import grid, write_msh
@@ -69,7 +69,7 @@ def frequencies(elements: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def beam(case: Scene) -> Any:
-    return build(Problem.of(case), MPI.COMM_SELF)
+    return Model(Problem.of(case), MPI.COMM_SELF).structure
 
 
 def polynomials(f: fem.Function) -> list[tuple[float, float, np.ndarray]]:

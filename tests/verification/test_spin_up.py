@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import ComputationError, run
-from rotfem.results import RunResult
+from rotfem.results.run import RunResult
 
 TIME = {"end": 20.0, "step": 0.004, "output_every": 5, "spectral_radius": 0.9}
 TOLERANCE = 1e-5  # m, on u1 and u2 at every time compared

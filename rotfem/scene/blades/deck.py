@@ -29,16 +29,13 @@ def find_file(folder: Path, name: str) -> Path | None:
     entry of the folder has that name then.
     """
     path = folder
-    try:
-        for part in Path(name.replace("\\", "/")).parts:
-            here = path / part
-            if not here.exists() and path.is_dir():
-                others = [each for each in path.iterdir() if each.name.lower() == part.lower()]
-                here = others[0] if len(others) == 1 else here
-            path = here
-        return path.resolve() if name and path.is_file() else None
-    except (OSError, ValueError):
-        return None
+    for part in Path(name.replace("\\", "/")).parts:
+        here = path / part
+        if not here.exists() and path.is_dir():
+            others = [each for each in path.iterdir() if each.name.lower() == part.lower()]
+            here = others[0] if len(others) == 1 else here
+        path = here
+    return path.resolve() if name and path.is_file() else None
 
 
 class Deck:
