@@ -83,10 +83,7 @@ def of_shapes(structure: Any, load: Load, n: int) -> Amplitude:
 
 
 def of_place(structure: Any, load: PlaceLoad, n: int) -> Amplitude:
-    """Return the values at the nodes of the structure, of the field through them.
-
-    That of a function which does not change is evaluated once, and has the single amplitude 1.
-    """
+    """Return the values at the nodes of the field through them; one amplitude, 1, where they do not change."""
     f = fem.Function(_space(structure, "Lagrange", structure.V.element.basix_element.degree, n))
     index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
     points = np.concatenate(structure.comm.allgather(x[: index.size_local]))

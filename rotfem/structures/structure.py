@@ -252,10 +252,7 @@ class Structure(Loaded):
         return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.intp]:
-        """Return the local numbers of the unknowns that the clamp holds at nodes; those of all owned nodes if None.
-
-        Among the latter are further unknowns where there are none.
-        """
+        """Return the local numbers of the unknowns that the clamp holds at nodes, of all owned nodes if None."""
         held = self._numbers(nodes, self._clamped_components())
         if nodes is not None or not self.extra:
             return held
