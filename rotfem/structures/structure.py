@@ -336,8 +336,16 @@ class Structure(Loaded):
         return x if self.comm.size == 1 else np.concatenate(self.comm.allgather(x))
 
     def nodes(self, values: npt.NDArray[Any]) -> tuple[dict[str, Array], npt.NDArray[Any]]:
-        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
-        raise NotImplementedError
+        """Return (coordinates x, of a plate y, (n,) each in m; values (n, components)) at all nodes, on every rank."""
+        x, q = self.gather(values)
+        names = "xy"[: self.mesh.geometry.dim]
+        return {name: x[self._order, i] for i, name in enumerate(names)}, q[self._order]
+
+    @cached_property
+    def _order(self) -> npt.NDArray[np.int64]:
+        """The permutation that sorts all nodes by x, then y."""
+        x, cell = self._points[:, : self.mesh.geometry.dim], 1e-9 * self.length  # closer nodes share a coordinate
+        return np.asarray(np.lexsort(np.round(x.T[::-1] / cell)))
 
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed structure are in the frame, (n, 3) in m, by their coordinates."""
