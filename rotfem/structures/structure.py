@@ -100,7 +100,7 @@ class PointValues:
 
 # --- amplitudes of loads in the forms ---------------------------------------------------------------------------------
 
-# The force (or moment) of a load in the forms is f = Σ_k a_k s_k (`rotfem.mechanics.loads`). Amplitudes of a uniform one
+# The force or moment of a load in the forms is f = Σ_k a_k s_k (`rotfem.mechanics.loads`). Amplitudes of a uniform one
 # are the components of a constant, those of one over the span the factors of shapes, whose sum is a field. A function
 # of place has its values at the nodes as amplitudes.
 
