@@ -90,7 +90,9 @@ def test_diagram_in_the_fixed_frame() -> None:
     (draw,) = diagram.drawings().values()
     figure = draw()
     check(figure)
-    assert {b["label"] for b in diagram.summary["branches"]} <= {text.get_text() for text in figure.axes[0].texts}
+    assert {b["label"] for b in diagram.summary["branches"]} <= {
+        text.get_text() for text in figure.legends[0].get_texts()
+    }
     circles = [c for line in figure.axes[0].lines if line.get_marker() == "o" for c in line.get_xydata()]
     assert [c[0] for c in circles[:2]] == [c.speed for c in diagram.critical_speeds[:2]]
     np.testing.assert_allclose(*np.array(circles[:2]).T)  # whirl as fast as the spin
@@ -177,6 +179,16 @@ def test_damped_bearings(theory: str, speed: float) -> None:
     expected = roots[np.argmax(roots.imag)]
     for row in rows:
         np.testing.assert_allclose([row["frequency"], row["growth"]], [expected.imag, expected.real], rtol=5e-5)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_damping_by_mode_of_a_shaft_is_external(theory: str) -> None:
+    """The modes at rest on their bearings have the ratio, and a Jeffcott rotor keeps it at any speed: 1e-4."""
+    for speed in (0.0, 200.0):
+        motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+        scene = shaft_on_bearings(2e4, motion=motion, model={"theory": theory})
+        scene["structure"]["damping"] = {"modal": 0.02}
+        np.testing.assert_allclose([row["damping"] for row in rotfem.modes(scene).rows], 0.02, rtol=1e-4)
 
 
 def test_cross_coupling_makes_forward_whirl_grow() -> None:
@@ -532,6 +544,23 @@ def test_bearings_over_speed_have_the_modes_of_their_values() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
+def test_tables_say_where_they_end() -> None:
+    """Every verb has a warning of what is beyond a table, and none within it."""
+    scene = shaft_on_bearings(
+        {"over_speed": [[0.0, 1e4], [60.0, 2e4]]}, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]}
+    )
+    load = {"tip_force": {"harmonic": {"amplitude": [0.0, 1.0, 0.0], "frequency": 1e-3}}}
+    for speed, there in ((50.0, False), (70.0, True)):
+        at = scene | {"motion": {"type": "constant", "speed": speed, "axis": [1, 0, 0]}}
+        found = [rotfem.run(at), rotfem.modes(at), rotfem.unbalance(at, [10.0, speed]), rotfem.explain(at)]
+        found += [
+            rotfem.campbell(at, [10.0, speed], only=True),
+            rotfem.response(at | {"loads": load}, 1.0, 2.0, number=2),
+        ]
+        for result in found:
+            assert any("supports.0.stiffness is a table" in text for text in result.summary["warnings"]) == there
+
+
 def test_bearings_over_frequency_are_those_of_each_whirl() -> None:
     """A stiffness k + a ω²: half the disk on it is heavier, k̂(ω) = k_s (k + aω²)/(k_s + k + aω²) = m/2 ω²; 1e-4."""
     k, a, k_s, half = 2e4, 3.0, 24.0 * EI, 5.0
@@ -592,7 +621,7 @@ def test_disk_is_its_mass_and_inertias() -> None:
     )
     np.testing.assert_allclose(one, other, rtol=1e-12)
     scene["structure"]["masses"] = [{"x": 0.5, "mass": 1.0, "offset": [0.0, 1e-4]}]
-    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset.*\[x, y, z\]"):
+    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset"):
         rotfem.Scene.from_dict(scene)
 
 
