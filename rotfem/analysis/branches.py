@@ -310,7 +310,7 @@ class Sweep:
         self.paths.append(path)
 
     def _model(self, solved: Sequence[Spinning]) -> SpeedModel:
-        """Return the model between some speeds, which knows the points beside them, too."""
+        """Return the model between some speeds, which knows the points next to them, too."""
         if self.model is not None:
             return self.model
         points, low, high = [p.spinning for p in self.points], solved[0].speed, solved[-1].speed
