@@ -18,24 +18,22 @@ from rotfem.units import speed_text
 Array = npt.NDArray[Any]
 
 
-def mode_tables(
-    analysis: ModalAnalysis, spinning: Spinning, count: int, formats: tuple[str, ...] | None = None
-) -> ModesResult:
+def mode_tables(found: Spinning, count: int, formats: tuple[str, ...] | None = None) -> ModesResult:
     """Return the first modes at a speed, with warnings of the model and of instabilities."""
-    speed, rigid, structure = spinning.speed, int(spinning.rigid), analysis.structure
-    spinning = spinning.first(count - rigid)
+    analysis, rigid, structure = found.analysis, int(found.rigid), found.analysis.structure
+    spinning = found.first(count - rigid)
     rows = mode_rows(spinning)
-    stability, warnings = remarks(analysis, spinning, rows)
+    stability, warnings = remarks(spinning, rows)
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
     if rigid:  # hub and structure turn together, λ = 0
-        columns = rows[0] if rows else mode_rows(spinning.first(1))[0]
+        columns = rows[0] if rows else mode_rows(found.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
         rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
     summary = {
-        **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
+        **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": found.speed},
         **{"effects": list(analysis.model.effects), "modes": rows, "shapes": {"length": structure.length}},
         **{"stability": stability.summary(), "warnings": warnings},
     }
@@ -46,9 +44,9 @@ def mode_tables(
     return out
 
 
-def remarks(analysis: ModalAnalysis, spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
+def remarks(spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
     """Return the stability of the equilibrium, and warnings of it, of the model, and of modes that grow."""
-    found = stability_of_pencil(spinning.pencil, spinning.clamped)
+    analysis, found = spinning.analysis, stability_of_pencil(spinning.pencil, spinning.clamped)
     out = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(rows)]
     out += critical(rows, spinning.speed, analysis.fixed)
     # An instability that grows by more than those of the modes that are asked for is none of them.

@@ -219,7 +219,7 @@ def result_of(
             row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
         rows.append(row | {"peak": int(peak)})
     modes = mode_rows(spinning)
-    stability, said = remarks(analysis, spinning, modes)
+    stability, said = remarks(spinning, modes)
     warnings = [*frozen_in_frame(analysis.problem), *said, *doubtful(modes)]
     warnings += [no_damping(modes, undamped)] if undamped else []
     if scene.accuracy is not None:
