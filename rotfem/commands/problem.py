@@ -340,10 +340,7 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
 
 
 def cell_of(time: Time | None) -> float | None:
-    """Return the length of time (s) in which differences of a user's function have one step; None without [time].
-
-    It is that of 16 steps, or a 64th of a history of adaptive steps.
-    """
+    """Return the time (s) in which differences have one step: of 16 steps, or a 64th of a history."""
     if time is None:
         return None
     return 16 * time.step if time.step else time.end / 64
