@@ -191,10 +191,7 @@ class Motion:
         return np.zeros(3) if self.base is None else self.base.at(t)
 
     def frame(self, t: float) -> dict[str, Array]:
-        """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
-
-        The velocity v_o is that by the pitch, without that of the hub's center.
-        """
+        """Return w, dw, a_o of the frame (rad/s, rad/s², m/s²), and v_o of its origin by the pitch, its components."""
         w, dw, a_o = self.speed(t) * self.axis, self.rate(t) * self.axis, self.base_acceleration(t)
         if self.pitch is None:
             return {"w": w, "dw": dw, "a_o": a_o}
@@ -228,10 +225,7 @@ class Motion:
 
 
 def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) of the spin-up Omega(t) = speed (t/T − sin(2πt/T)/2π), constant after T.
-
-    Kane, Ryan & Banerjee 1987; ICCIA 2017 eq. (17).
-    """
+    """Return (Omega, dOmega/dt, psi) of speed (t/T − sin(2πt/T)/2π), constant after T (ICCIA 2017 eq. (17))."""
     T, k = duration, 2 * pi / duration
 
     def rising(t: Any, sine: Callable[[Any], Any]) -> Any:

@@ -40,11 +40,7 @@ from rotfem.units import unit_of
 
 
 def abridged(value: Any, given: Any) -> Any:
-    """Return the tables of a validated scene with long tables of numbers replaced by what identifies them.
-
-    In their place stand the number of `rows` and `columns`, the `sha256` of the numbers (doubles, least byte first, row
-    after row), and the `file` where the user gave one: `given` are the same tables as they were given.
-    """
+    """Return the tables of a scene, long ones of numbers as rows, columns, SHA-256, and the file that is given."""
     if isinstance(value, Mapping):
         # A load may be given as the path of its table, without the table around it.
         below = given if isinstance(given, Mapping) else dict.fromkeys(value, given)

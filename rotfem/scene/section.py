@@ -374,10 +374,7 @@ class SpatialSection(Section):
         return bool(np.any(self.at(self.knots)["mass"][..., 3:, 3:] != 0.0))
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Return the matrices `stiffness` and `mass` at positions x (m), shape (…), along the beam: (…, 6, 6).
-
-        They are in SI units and section axes.
-        """
+        """Return `stiffness` and `mass`, (…, 6, 6) in section axes and SI units, at positions x (m), (…)."""
         x = np.asarray(x, dtype=np.float64)
         if self.stiffness is not None and self.mass is not None:
             return {"stiffness": evaluate(self.stiffness, x), "mass": evaluate(self.mass, x)}

@@ -182,10 +182,7 @@ def empty() -> Any:
 
 
 def one_of(tables: Mapping[str, type[SceneModel]], other: type[SceneModel] | None = None) -> PlainValidator:
-    """Return what reads a table of the type that its key `type` names; of any other type it is `other`, if given.
-
-    Not a union of pydantic's: the classes that a scene does not name need no validators, which take time to make.
-    """
+    """Return what reads a table of the type that its key `type` names, or `other`; it makes no other validators."""
 
     def read(value: Any, info: ValidationInfo) -> Any:
         if isinstance(value, SceneModel):

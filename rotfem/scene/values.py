@@ -106,11 +106,7 @@ TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidat
 
 
 def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:
-    """Return whether a symmetric matrix is positive definite, or semidefinite to a slack, as mass without inertias is.
-
-    It is judged with ones on its diagonal, as its entries have different units and sizes: otherwise a soft direction
-    would pass for round-off, or the reverse.
-    """
+    """Return whether a symmetric matrix, with ones on its diagonal, is positive (semi)definite to a slack."""
     diagonal = np.diag(matrix)
     if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
         return False
