@@ -203,7 +203,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give end, and step or tolerance'
+                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
@@ -222,8 +222,6 @@ class Scene(SceneModel):
         check_mesh(structure, self.mesh)
         check_prestress(structure, model)
         check_initial(structure, motion, model, self.initial)
-        if self.accuracy is None and self.accuracy_budget is not None:
-            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
         if self.accuracy is not None and not self.output.error:
             why = "cannot be combined with accuracy, which is met by what is estimated"
             raise problem("output.error", False, why)

@@ -373,9 +373,6 @@ class OutputTable(SceneModel):
         if self.stations is None:
             if named and kind in FORCES:
                 raise problem("output.quantities", list(self.quantities), f'"{named[0]}" needs output.stations')
-            for key in ("every", "format"):
-                if getattr(self, key) != type(self).model_fields[key].default:
-                    raise problem(f"output.{key}", getattr(self, key), "has no meaning without output.stations")
             return
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)
