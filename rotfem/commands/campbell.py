@@ -20,7 +20,7 @@ from rotfem.accuracy.modes import modal_errors
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep, synchronous
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import over_range
-from rotfem.commands.advice import frozen_inputs
+from rotfem.commands.advice import beyond, frozen_inputs
 from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of
@@ -207,6 +207,7 @@ def diagram(
     warnings = [
         *advice(analysis, fastest),
         *frozen_inputs(analysis.problem),
+        *beyond(analysis.problem, *([row[name] for row in rows] for name in ("speed", "frequency"))),
         *remarks(sweep, labels, onsets),
         *(f"at {speed_text(last.speed)}, {text}" for text in doubtful([r for r in rows if r["speed"] == last.speed])),
         *([] if stopped is None else [f"{done}{speed_text(last.speed)}{goes_on}"]),
