@@ -90,9 +90,7 @@ def test_diagram_in_the_fixed_frame() -> None:
     (draw,) = diagram.drawings().values()
     figure = draw()
     check(figure)
-    assert {b["label"] for b in diagram.summary["branches"]} <= {
-        text.get_text() for text in figure.legends[0].get_texts()
-    }
+    assert set(diagram.labels) <= {text.get_text() for text in figure.axes[0].texts}
     circles = [c for line in figure.axes[0].lines if line.get_marker() == "o" for c in line.get_xydata()]
     assert [c[0] for c in circles[:2]] == [c.speed for c in diagram.critical_speeds[:2]]
     np.testing.assert_allclose(*np.array(circles[:2]).T)  # whirl as fast as the spin
@@ -847,3 +845,40 @@ def test_every_table_says_its_frame() -> None:
     for row in unequal.rows:
         both = sorted([row["frequency_fixed"], row["frequency_fixed_2"]])
         np.testing.assert_allclose(both, sorted([abs(row["frequency"] - 50.0), row["frequency"] + 50.0]))
+
+
+def test_shafts_are_drawn_as_they_are_built() -> None:
+    """A step, a bore, a disk and a support where they are; modes with orbits as wide as their shapes."""
+    scene = spinning_shaft()
+    section = {
+        "shape": "tube",
+        "E": 2e11,
+        "nu": 0.3,
+        "rho": 7800.0,
+        "inner_radius": [[0, 0], [6, 0], [6, 0.02], [10, 0.02]],
+    }
+    scene["structure"]["section"] = section | {"outer_radius": [[0, 0.05], [4, 0.05], [4, 0.08], [10, 0.08]]}
+    scene["structure"]["masses"] = [{"x": 7.0, "disk": {"outer_diameter": 1.0, "width": 0.1, "rho": 7800.0}}]
+    figure = rotfem.check(scene).plot()
+    check(figure)
+    axis = figure.axes[0]
+    lines = [np.asarray(line.get_xydata(), dtype=float) for line in axis.lines]
+    edge = lines[0]
+    for x, radius in ((3.99, 0.05), (4.01, 0.08)):
+        np.testing.assert_allclose(np.interp(x, *edge.T), radius, rtol=1e-9)
+    assert np.interp(4.01, *edge.T) == pytest.approx(0.08)
+    (disk,) = axis.patches
+    box = [disk.get_x(), disk.get_y(), disk.get_width(), disk.get_height()]
+    np.testing.assert_allclose(box, [6.95, -0.5, 0.1, 1.0], rtol=1e-9)
+    ends = [line[0].tolist() for line in lines if len(line) == 1 and line[0, 1] < 0.0]
+    assert ends == [[0.0, -0.05], [10.0, -0.08]]
+    found = rotfem.modes(scene)
+    figure = found.plot()
+    check(figure)
+    assert [a.name for a in figure.axes] == ["3d"] * 4
+    assert all(row["label"] in a.get_title() for row, a in zip(found.rows, figure.axes, strict=True))
+    (shape, *_), axes = found.shapes.values(), figure.axes[0]
+    orbits = [np.array(line.get_data_3d()) for line in axes.lines if len(line.get_data_3d()[0]) == 60]
+    widths = [np.hypot(*orbit[1:]).max() for orbit in orbits]
+    at = [np.flatnonzero(shape["x"] == orbit[0, 0])[0] for orbit in orbits]
+    np.testing.assert_allclose(widths, np.abs(shape["u2"] + 1j * shape["u2_imag"])[at], rtol=1e-2, atol=1e-6)
