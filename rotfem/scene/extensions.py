@@ -57,11 +57,7 @@ def load_wanted(tables: dict[str, Any], file: str, directory: str, trust: bool) 
 
 
 def load(name: str, path: Path, file: str, key: str) -> None:
-    """Run a Python file that registers something, unless it has been run.
-
-    Where it cannot be read, or fails, what it has registered is taken back, and a SceneError says why, with the line:
-    of the key and the file that name it, under the name that the user has given.
-    """
+    """Run a Python file that registers something, once; where it fails, what it registered is taken back."""
     try:
         source = read_bytes(path)
         path = path.resolve()
@@ -90,11 +86,7 @@ def loaded() -> tuple[Path, ...]:
 
 
 def failure(error: Exception) -> str:
-    """Return the message of an unexpected error where files have been loaded, "" where none has.
-
-    Of an error that passes through a file it names the line. Of any other, as a wrong number of arguments, the
-    files are only where the fault may be.
-    """
+    """Return the message of an unexpected error that files may have to do with, with the line of a file; or ""."""
     for path in _LOADED:
         if any(frame.filename == str(path) for frame in traceback.extract_tb(error.__traceback__)):
             return f"{shown(path)}: {_described(error, path)}"

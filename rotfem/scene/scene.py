@@ -40,11 +40,7 @@ from rotfem.units import unit_of
 
 
 def abridged(value: Any, given: Any) -> Any:
-    """Return the tables of a validated scene with long tables of numbers replaced by what identifies them.
-
-    In their place stand the number of `rows` and `columns`, the `sha256` of the numbers (doubles, least byte first, row
-    after row), and the `file` where the user gave one: `given` are the same tables as they were given.
-    """
+    """Return the tables of a scene, long ones of numbers as rows, columns, SHA-256, and the file that is given."""
     if isinstance(value, Mapping):
         # A load may be given as the path of its table, without the table around it.
         below = given if isinstance(given, Mapping) else dict.fromkeys(value, given)
@@ -207,7 +203,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give end, and step or tolerance'
+                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
@@ -226,8 +222,6 @@ class Scene(SceneModel):
         check_mesh(structure, self.mesh)
         check_prestress(structure, model)
         check_initial(structure, motion, model, self.initial)
-        if self.accuracy is None and self.accuracy_budget is not None:
-            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
         if self.accuracy is not None and not self.output.error:
             why = "cannot be combined with accuracy, which is met by what is estimated"
             raise problem("output.error", False, why)
