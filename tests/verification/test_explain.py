@@ -352,7 +352,7 @@ def test_an_own_model_that_fails_is_reported() -> None:
     coriolis = next(line for line in report(result) if line.startswith("without coriolis"))
     assert coriolis.split()[2] == "inf"
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
-    assert '"estimate"' in result.texts()["explain.json"]
+    assert "estimate_modes" in result.texts()["explain.csv"]
     result.drawings()["explain.png"]()
 
 
