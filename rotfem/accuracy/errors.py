@@ -32,6 +32,7 @@ from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
 from rotfem.analysis.schemes import LONGEST
 from rotfem.errors import ComputationError, InputError
+from rotfem.results.columns import ShortTable
 from rotfem.results.distance import Distance, Spectrum
 from rotfem.scene import Scene
 
@@ -62,6 +63,9 @@ FLOOR = 1e-9
 
 #: Error from which a warning names its cures; error of a theory from which it is warned of.
 NOTICED, OUT_OF_RANGE = 0.01, 0.05
+
+#: Characters of a line of the table of settings.
+LINE = 120
 
 #: Contributions to an error as they are called in text.
 WORDS = {
@@ -232,8 +236,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     for name, others in ways.items():
         answers.times = rows
         found = _compare(out, name, answers, own, others)
-    if (lost := own.outcome.round_off) is not None:
-        out.parts["round_off"] = lost
+    if (lost := own.outcome.round_off) is not None:  # a bound; that of another mesh is independent, so d shows it
+        out.parts["round_off"] = min([lost, *(r["error"] for r in out.rows[:1])])
     if not registry.theories[setting.theory].exact:
         out.parts["model"] = of_theory(out, answers, own, found or own)
     return out
@@ -381,13 +385,12 @@ def error_line(summary: Mapping[str, Any]) -> str:
 
 def table_lines(rows: list[dict[str, Any]]) -> list[str]:
     """Return the table of settings as lines."""
-    cells = [("setting", "error", "CPU s")] if rows else []
+    cells = []
     for r in rows:
         about, size = "≈ " if r.get("extrapolated") else "", _known(r.get("error"))
         error = r.get("failed", "–" if size is None else f"{about}{size:.1e}" if size > FLOOR else f"< {FLOOR:.0e}")
         cells.append((r["words"], error, f"{about}{r['seconds']:.2g}"))
-    wide = [max((len(line[i]) for line in cells), default=0) for i in range(3)]
-    return [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells]
+    return ShortTable(("setting", "error", "CPU s"), cells).lines(LINE) if cells else []
 
 
 def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
