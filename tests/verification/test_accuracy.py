@@ -40,7 +40,7 @@ SCENES: dict[str, dict[str, Any]] = {
             **{"E": 7e10, "nu": 0.33, "rho": 2700.0},
         },
         "motion": {"type": "constant", "speed": 10.0},
-        "loads": {"pressure": [[0, 0], [0.05, 90.0], [0.1, 0]]},
+        "loads": {"pressure": {"over_time": [[0, 0], [0.05, 90.0], [0.1, 0]]}},
         "time": {"end": 0.2},
     },
 }
