@@ -11,6 +11,7 @@ an ellipse made of a forward circle r_f = ½(y + i z) and a backward one r_b = �
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,13 +73,15 @@ class UnbalanceResponse:
     Args:
         analysis: compiled shaft in the fixed frame.
         found: its unbalances.
+        further: further places, m.
 
     Attributes:
         x: nodes, m, increasing, (nodes,).
         supports: places of the supports, m.
+        places: those of the unbalances, of the supports, and the further ones, m, increasing.
     """
 
-    def __init__(self, analysis: ModalAnalysis, found: tuple[Unbalance, ...]):
+    def __init__(self, analysis: ModalAnalysis, found: tuple[Unbalance, ...], further: Iterable[float] = ()):
         self._analysis, self._system = analysis, analysis.system
         structure, V = analysis.structure, analysis.system.V
         self._across = [list(structure.unknowns).index(name) for name in ("u2", "u3", "theta2", "theta3")]
@@ -90,10 +93,12 @@ class UnbalanceResponse:
             self._force += weights[:, self._across[:2]] @ push
         self._force[self._system.clamped] = 0.0
         self.supports = [support.x for support in structure.data.supports]
+        self.places = sorted({*(u.x for u in found), *self.supports, *further})
+        self._at = [PointValues(V, np.array([x, 0.0, 0.0])) for x in self.places]
         self.x = structure.nodes(self._system.zeros())[0]["x"]
 
-    def at(self, speed: float) -> tuple[Complex, Complex]:
-        """Return displacements u₂, u₃ (m) at the nodes, (2, nodes), and forces of the shaft on supports (N), (2, n).
+    def at(self, speed: float) -> tuple[Complex, Complex, Complex]:
+        """Return u₂, u₃ (m) at the nodes, (2, nodes), and at the places, and forces on supports (N), (2, n).
 
         Args:
             speed: Ω, rad/s.
@@ -105,6 +110,7 @@ class UnbalanceResponse:
         solver.factor((1.0, 1j * speed, -(speed**2)))
         u = solver.solve(np.asarray(self._force * speed**2, dtype=np.complex128))
         nodes = analysis.structure.nodes(u)[1][:, self._across[:2]].T
+        there = np.array([point(u)[self._across[:2]] for point in self._at]).T
         forces = analysis.structure.support_forces(frame, speed, u, 1j * speed * u)
         both = [forces[f"support_{i}_f"] for i in range(len(self.supports))]
-        return nodes, np.array(both, dtype=np.complex128).reshape(-1, 2).T
+        return nodes, there, np.array(both, dtype=np.complex128).reshape(-1, 2).T

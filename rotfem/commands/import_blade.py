@@ -1,4 +1,4 @@
-"""`rotfem import`: a scene from a blade file of another program."""
+"""`rotfem import`: a scene from a blade or rotor file of another program."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any
 from rotfem.results.files import write_text
 from rotfem.scene import Scene
 from rotfem.scene.files import apply_overrides
-from rotfem.scene.scene import plain
 
 
 def import_blade(file: str | Path, format: str | None = None, changes: Sequence[str] = ()) -> Scene:
-    """Return the scene of a blade file, at rest, with nothing in it but the blade and what is changed.
+    """Return the scene of a blade or rotor file, at rest, with nothing in it but that and what is changed.
 
     Args:
-        file: the blade file, of one of the formats in `docs/blades.md`.
+        file: the file, of one of the formats in `docs/blades.md`.
         format: its name; None takes what the file says of itself.
         changes: keys that the file leaves open, such as "structure.length=61.5", applied in order.
 
@@ -32,11 +31,10 @@ def import_blade(file: str | Path, format: str | None = None, changes: Sequence[
     }
     tables = apply_overrides(path.name, tables, changes)
     scene = Scene.from_dict(tables, path.stem)
-    read = scene.structure
-    structure: dict[str, Any] = {"type": read.type} | {
-        key: value for key, value in plain(read).items() if key in read.model_fields_set
-    }
-    imported = Scene.from_dict({**tables, "structure": structure}, path.stem)
+    structure = scene.structure.model_dump(exclude_unset=True, exclude_none=True)
+    if structure.get("root", {}).get("driven"):
+        tables = {**tables, "motion": {"axis": [1.0, 0.0, 0.0], **tables["motion"]}}
+    imported = Scene.from_dict({**tables, "structure": {"type": "spatial_beam", **structure}}, path.stem)
     imported._hints, imported._inputs = scene._hints, scene._inputs
     return imported
 
@@ -47,17 +45,19 @@ def write_imported(scene: Scene, source: Path, path: Path) -> Path:
     return write_text(path, head + toml_text(scene.tables))
 
 
-def toml_text(tables: Mapping[str, Any], above: str = "") -> str:
+def toml_text(tables: Mapping[str, Any], above: str = "", head: str = "[{}]") -> str:
     """Return nested tables as TOML; tables of numbers have a row on each line."""
-    lines = [f"\n[{above}]"] if above and any(not isinstance(value, Mapping) for value in tables.values()) else []
+    nested, lines = dict[str, Any](), list[str]()
     for key, value in tables.items():
-        if isinstance(value, Mapping):
-            continue
-        if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple):
-            rows = "".join(f"  {json.dumps(row)},\n" for row in value)
-            lines.append(f"{key} = [\n{rows}]")
+        rows = isinstance(value, list | tuple) and len(value) > 0 and value[0]
+        if isinstance(value, Mapping) or isinstance(rows, Mapping):
+            nested[f"{above}.{key}".lstrip(".")] = value
+        elif isinstance(rows, list | tuple):
+            lines.append(f"{key} = [\n" + "".join(f"  {json.dumps(row)},\n" for row in value) + "]")
         else:
             lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
-    text = "".join(f"{line}\n" for line in lines)
-    inner = ((f"{above}.{key}".lstrip("."), value) for key, value in tables.items() if isinstance(value, Mapping))
-    return text + "".join(toml_text(value, name) for name, value in inner)
+    text = "".join(f"{line}\n" for line in ([f"\n{head.format(above)}", *lines] if above and lines else lines))
+    for name, value in nested.items():
+        text += toml_text(value, name) if isinstance(value, Mapping) else ""
+        text += "".join(toml_text(row, name, "[[{}]]") for row in value) if isinstance(value, list | tuple) else ""
+    return text

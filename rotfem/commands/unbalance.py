@@ -13,6 +13,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq, minimize_scalar
 
 from rotfem.analysis.unbalance import Orbits, UnbalanceResponse
+from rotfem.commands.advice import beyond
 from rotfem.commands.campbell import parse_speeds
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
@@ -69,40 +70,37 @@ def unbalance(
             if not 0.0 <= x <= (shown.structure.length or 0.0):
                 raise SceneError("command line", "--probe", x, f"must be from 0 to {shown.structure.length:g} m")
         analysis = analysis_of(shown, problem, comm, False)
-        response = UnbalanceResponse(analysis, problem.unbalances)
-        places = sorted({*(u.x for u in problem.unbalances), *response.supports, *(x for x, _ in probes)})
+        response = UnbalanceResponse(analysis, problem.unbalances, (x for x, _ in probes))
         answers = [response.at(speed) for speed in asked]
         rows = [
             row
             for speed, answer in zip(asked, answers, strict=True)
-            for row in rows_of(response, speed, answer, places, probes)
+            for row in rows_of(response, speed, answer, probes)
         ]
-        found = peaks_of(response, asked, answers, places, operating)
+        found = peaks_of(response, asked, answers, operating)
         summary = {
             **modal_summary("unbalance", analysis, shown, started),
             "unbalances": [{"x": u.x, "kg_m": u.moment, "phase": u.phase} for u in problem.unbalances],
-            "places": places,
+            "places": response.places,
             "probes": [{"x": x, "angle": angle} for x, angle in probes],
             "operating": None if operating is None else list(operating),
             "peaks": found,
-            "warnings": [*analysis.notes, *beyond(problem, asked)],
+            "warnings": [*analysis.notes, *beyond(problem, asked, asked)],
             "advice": [],
         }
-        return UnbalanceResult(summary, rows, np.array([shape for shape, _ in answers]), response.x)
+        return UnbalanceResult(summary, rows, np.array([shape for shape, _, _ in answers]), response.x)
 
 
 def rows_of(
     response: UnbalanceResponse,
     speed: float,
-    answer: tuple[Array, Array],
-    places: Sequence[float],
+    answer: tuple[Array, Array, Array],
     probes: Sequence[tuple[float, float]],
 ) -> list[dict[str, Any]]:
     """Return one row a place at a speed (see `rotfem.UnbalanceResult`)."""
-    shape, forces = answer
+    _, there, forces = answer
     rows = []
-    for x in places:
-        y, z = (np.interp(x, response.x, part) for part in shape)
+    for x, (y, z) in zip(response.places, there.T, strict=True):
         orbit = Orbits(y, z)
         row: dict[str, Any] = {"speed": float(speed), "x": float(x)}
         for name, value in (("u2", y), ("u3", z)):
@@ -121,23 +119,21 @@ def rows_of(
 def peaks_of(
     response: UnbalanceResponse,
     speeds: Sequence[float],
-    answers: Sequence[tuple[Array, Array]],
-    places: Sequence[float],
+    answers: Sequence[tuple[Array, Array, Array]],
     operating: Sequence[float] | None,
 ) -> list[dict[str, Any]]:
     """Return the peaks of the larger semi-axis at every place, between the speeds."""
 
-    def major(speed: float, x: float) -> float:
-        shape, _ = response.at(float(speed))
-        return float(Orbits(*(np.interp(x, response.x, part) for part in shape)).major)
+    def major(speed: float, place: int) -> float:
+        return float(Orbits(*response.at(float(speed))[1][:, place]).major)
 
     peaks = []
-    for x in places:
-        sizes = np.array([Orbits(*(np.interp(x, response.x, p) for p in shape)).major for shape, _ in answers])
+    for place, x in enumerate(response.places):
+        sizes = np.array([Orbits(*there[:, place]).major for _, there, _ in answers])
         for i in 1 + np.flatnonzero((sizes[1:-1] > sizes[:-2]) & (sizes[1:-1] >= sizes[2:])):
             between = (speeds[i - 1], speeds[i + 1])
             top = minimize_scalar(
-                lambda s, x=x: -np.log(major(s, x)),
+                lambda s, place=place: -np.log(major(s, place)),
                 bounds=between,
                 method="bounded",
                 options={"xatol": 1e-6 * between[1]},
@@ -149,7 +145,7 @@ def peaks_of(
                     beyond_it += way
                 if 0 <= beyond_it < len(speeds):
                     ends = sorted((at, speeds[beyond_it]))
-                    sides.append(brentq(lambda s, x=x, size=size: major(s, x) - HALF_POWER * size, *ends, rtol=1e-7))
+                    sides.append(brentq(lambda s, i=place, h=HALF_POWER * size: major(s, i) - h, *ends, rtol=1e-7))
             amplification = float(top.x / (sides[1] - sides[0])) if len(sides) == 2 else None
             peaks.append(
                 {
@@ -167,18 +163,6 @@ def margin(speed: float, operating: Sequence[float]) -> float:
     """Return the distance of a speed from a range in parts of the nearer end of it; 0 within it."""
     low, high = operating
     return (low - speed) / low if speed < low else (speed - high) / high if speed > high else 0.0
-
-
-def beyond(problem: Problem, speeds: Sequence[float]) -> list[str]:
-    """Return warnings of coefficients of supports that are held constant outside of their tables."""
-    out = []
-    for i, support in enumerate(problem.structure.supports):
-        for name in ("stiffness", "damping", "tilt_stiffness", "tilt_damping"):
-            table = getattr(support, name)
-            of = [table.beyond(s) for s in (speeds[0], speeds[-1])] if hasattr(table, "beyond") else []
-            if any(of):
-                out.append(f"structure.supports.{i}.{name} is a table {max(of)}; beyond them it is held constant")
-    return out
 
 
 def probe_of(text: str) -> tuple[float, float]:

@@ -327,10 +327,7 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def is_round(self) -> bool:
-        """Whether it is straight, is the same in all directions about its axis, and no support turns.
-
-        Masses off the axis are unbalance, no asymmetry.
-        """
+        """Whether it is straight, the same in all directions about its axis but for unbalance, and no support turns."""
         if not self.is_straight or self.hinges or self.pitches or any(s.frame == "rotating" for s in self.supports):
             return False
         places = np.union1d(self.section.knots, self.length)
@@ -392,11 +389,8 @@ class SpatialBeamStructure(BeamStructure):
                 raise problem(key, None, "need a straight beam: without precone, sweep, line, and hub_offset across it")
         springs = {s.x for s in self.supports if s.holds}
         if self.root.driven and not self.root.free and len(springs) < 2:
-            raise problem(
-                "root.driven",
-                True,
-                "needs structure.supports with a stiffness at two places at least, or root.free",
-            )
+            why = "needs structure.supports with a stiffness at two places at least, or root.free"
+            raise problem("root.driven", True, why)
 
 
 def same_about_axis(A: Array) -> bool:

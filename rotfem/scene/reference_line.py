@@ -18,10 +18,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 def as_line(rows: Matrix) -> Matrix:
-    """Return points (x, y, z) in m; refuse them unless the first is the clamp (0, 0, 0), and they follow a line.
-
-    Two equal rows are a kink.
-    """
+    """Return points (x, y, z) in m of a line from the clamp (0, 0, 0), two equal rows a kink; refuse others."""
     if len(set(rows)) < 2 or rows[0] == rows[1] or rows[-1] == rows[-2]:
         raise problem("", None, "must be points [[x, y, z], …], at least two, and no kink at an end")
     if rows[0] != (0.0, 0.0, 0.0):
@@ -123,10 +120,7 @@ class SweptLine:
         return self.knots
 
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) (see `ReferenceLine.at`).
-
-        The position is (∫ cos χ, ∫ sin χ, 0), exact, arc by arc.
-        """
+        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,), exact, arc by arc."""
         places = np.atleast_1d(np.asarray(x, dtype=np.float64))
         position = np.zeros((len(places), 3))
         for (a, first), (b, last) in pairwise(self.rows):

@@ -205,10 +205,7 @@ def estimates_error(scheme: type) -> bool:
 
 
 def usual(given: Mapping[str, Any]) -> str:
-    """Return the name of the scheme of a [time] table that names none, by what it gives.
-
-    Fixed steps are generalised-α's; to a tolerance one of higher order needs far fewer steps.
-    """
+    """Return the scheme of a [time] table that names none: generalised-α for fixed steps, esdirk4 for a tolerance."""
     fixed = "generalised_alpha"
     of_fixed = any(key in given for key in parameters_of(registry.schemes[fixed]))
     return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
@@ -270,9 +267,6 @@ class Time(WithParameters):
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
         if self.output_step is not None and self.output_every != 1:
             raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
-        for key in ("max_step", "min_step"):
-            if self.tolerance is None and getattr(self, key) is not None:
-                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
 
 
 class ModesTable(SceneModel):
@@ -320,11 +314,6 @@ Stations = Annotated[
 ]
 
 
-def _as_fields(value: Any) -> tuple[str, ...]:
-    """Return ("xdmf",), or nothing where that is wanted; "vtx", a format of earlier versions, stands for it too."""
-    return ("xdmf",) if as_names(value, ("xdmf", "vtx"), "a format") else ()
-
-
 #: Units in which speeds and frequencies can be printed and drawn.
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
@@ -348,7 +337,7 @@ class OutputTable(SceneModel):
     stations: Stations | None = None
     every: Count = 1
     format: Literal["csv", "netcdf"] = "csv"
-    fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
+    fields: tuple[Literal["xdmf"], ...] = ("xdmf",)
     error: StrictBool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"
@@ -384,9 +373,6 @@ class OutputTable(SceneModel):
         if self.stations is None:
             if named and kind in FORCES:
                 raise problem("output.quantities", list(self.quantities), f'"{named[0]}" needs output.stations')
-            for key in ("every", "format"):
-                if getattr(self, key) != type(self).model_fields[key].default:
-                    raise problem(f"output.{key}", getattr(self, key), "has no meaning without output.stations")
             return
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)

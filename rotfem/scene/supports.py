@@ -11,17 +11,18 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag
 
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import SceneModel, in_units, problem, unit
-from rotfem.scene.values import Array, NonNegative, Number, Positive, check_increasing, is_positive
+from rotfem.scene.values import ROUND_OFF, Array, NonNegative, Number, Positive, check_increasing
 
 #: A matrix of two rows of two: yy, yz, zy, zz.
 ZERO = ((0.0, 0.0), (0.0, 0.0))
 
 
-def _checked(matrix: Any, place: str = "") -> Any:
-    """Return a matrix; refuse one whose symmetric part is not positive semidefinite: its spring would pull away."""
-    if not is_positive(np.array(matrix) + np.transpose(matrix), definite=False):
-        why = "must be a number, or [[yy, yz], [zy, zz]] with a positive semidefinite symmetric part"
-        raise problem("", None, f"{place}{why}; rows over the speed are {{ over_speed = [[speed, value], …] }}")
+def _checked(matrix: Any) -> Any:
+    """Return a matrix; refuse one that reads as two rows over the speed: rising, and no spring that gives no energy."""
+    (yy, yz), (zy, zz) = matrix
+    if 0.0 <= yy < zy and yz > 0.0 and zz > 0.0 and (yz + zy) ** 2 > 4.0 * yy * zz:
+        why = "must be a number or [[yy, yz], [zy, zz]]; rows over the speed are { over_speed = [[speed, value], …] }"
+        raise problem("", None, f"{why}, also where this is a matrix")
     return matrix
 
 
@@ -34,7 +35,6 @@ def _rows(rows: Any, keys: int) -> Any:
             allowed = "the value, the two yy, zz, or the four yy, yz, zy, zz"
             raise problem("", list(row), f"must be rows of {'one place' if keys == 1 else 'two places'} and {allowed}")
         yy, yz, zy, zz = entries if len(entries) == 4 else (entries[0], 0.0, 0.0, entries[-1])
-        _checked(((yy, yz), (zy, zz)), f"at {row[0]:g} it ")
         out.append((*row[:keys], yy, yz, zy, zz))
     return tuple(out)
 
@@ -102,13 +102,16 @@ class CoefficientTable(SceneModel):
         x = place[int(self.of_frequency)]
         return np.asarray(self._splines(np.clip(x, self._splines.x[0], self._splines.x[-1]))).reshape(2, 2)
 
-    def beyond(self, speed: float) -> str:
-        """Return which of its speeds is exceeded by a speed (rad/s), "" if none is."""
-        table = self.over_speed or self.over_both
-        if table is None:
-            return ""
-        first, last = min(row[0] for row in table), max(row[0] for row in table)
-        return "" if first <= abs(speed) <= last else f"from {first:g} to {last:g} rad/s"
+    def beyond(self, speeds: Array, frequencies: Array) -> str:
+        """Return which of its range is exceeded by speeds or frequencies of whirl (rad/s); "" if none is."""
+        table = np.array(self.over_speed or self.over_frequency or self.over_both)
+        axes = [frequencies] if self.over_frequency else [speeds] if self.over_speed else [speeds, frequencies]
+        names = ["frequencies of whirl"] if self.over_frequency else ["speeds", "frequencies of whirl"]
+        for name, values, column in zip(names, axes, table.T, strict=False):
+            first, last, sizes = min(column), max(column), np.abs(values)
+            if np.any((sizes < first * (1 - ROUND_OFF)) | (sizes > last * (1 + ROUND_OFF))):
+                return f"{name} from {first:g} to {last:g} rad/s"
+        return ""
 
 
 def _coefficient(name: str) -> Any:
@@ -121,7 +124,7 @@ def _coefficient(name: str) -> Any:
         value = in_units(value, (name,))
         return value if isinstance(value, list | tuple | SceneModel) else ((value, 0.0), (0.0, value))
 
-    two_by_two = Annotated[tuple[tuple[NonNegative, Number], tuple[Number, NonNegative]], AfterValidator(_checked)]
+    two_by_two = Annotated[tuple[tuple[Number, Number], tuple[Number, Number]], AfterValidator(_checked)]
     ways = Annotated[two_by_two, Tag("<one>")] | Annotated[CoefficientTable, Tag("<table>")]
     kind = Discriminator(lambda value: "<one>" if isinstance(value, list | tuple) else "<table>")
     return Annotated[ways, kind, BeforeValidator(read)]

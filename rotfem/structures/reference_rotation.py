@@ -95,10 +95,7 @@ class Turns:
     # --- range ------------------------------------------------------------------------------------------------------
 
     def reached(self, q: Array, v: Array | None = None, h: float = 0.0) -> float:
-        """Return the part of the limit that the rotations of q (local dof array) take, over all processes.
-
-        With rates v (rad/s) it is, to be safe, what a step of twice the length h (s) would lead to.
-        """
+        """Return the part of the limit that rotations of q take, with rates v after a step of twice h (s)."""
         reach = self._reach(self._of(q))
         if v is not None:
             reach = reach + 2 * abs(h) * self._reach(self._of(v))
@@ -250,9 +247,7 @@ def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
         theory = beam.problem.theory
         limited = "behind more than one hinge" if theory.exact else f"in the theory {theory.name}"
         others = "a spring or a damper at the root" if theory.exact else f'model.theory = "{richest().name}"'
-        raise ComputationError(
-            f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns "
-            f"relative to the frame; {limited} rotations are limited to one",
-            time,
-            f"a smaller load, or {others}",
+        what = (
+            f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns"
         )
+        raise ComputationError(f"{what}; {limited} rotations are limited to one", time, f"a smaller load, or {others}")

@@ -434,10 +434,7 @@ class SpatialBeam(Beam):
         return self._forms.strains(Gamma, K, self.dx_elastic, self._pretwist)
 
     def _measured(self, measures: Callable[..., tuple[Any, Any]]) -> tuple[Any, Any]:
-        """Return Γ and K of one theory's measures along t_i.
-
-        Counted from a reference they are those of a beam with the axis R e and the curvature of the reference.
-        """
+        """Return Γ and K of one theory's measures along t_i; from a reference with its axis R e and its curvature."""
         q, e = self.k.q, self._triad[0]
         dq = q.dx(0)
         du = ufl.as_vector([dq[i] for i in (0, 1, 2)])
@@ -509,10 +506,7 @@ class SpatialBeam(Beam):
         return theta + rotation_part(self.turns.before)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state in which some section has turned by more than a turn, where that has no reference.
-
-        In a plane a rotation vector has one component, and no limit.
-        """
+        """Refuse sections turned by more than a turn without a reference; in a plane there is no limit."""
         in_plane = len(self.active) < len(self.components) and self.problem.theory.exact
         if self.turns is None and not in_plane:
             check_sections(self, q, time)

@@ -40,10 +40,7 @@ def stretch_by_twist(radius_squared: Any, twist: Any, pretwist: Any, warping: An
 
 
 def radius_of(C: Any) -> Any:
-    """Return r² (m²) of a section stiffness (6, 6), r from its shear center.
-
-    Of the moments about the tension center and the distance of both centers.
-    """
+    """Return r² (m²) of a section stiffness (6, 6) about its shear center."""
     EA = C[0][0]
     shares = [0 if isinstance(c, int) else c / EA for c in C[0]]
     bending = C[4][4] / EA - shares[4] ** 2 + C[5][5] / EA - shares[5] ** 2
@@ -88,10 +85,7 @@ def moving_moments(masses: Array) -> tuple[list[tuple[int, int]], bool]:
 
 
 def euler_tensor(inertia: npt.ArrayLike) -> list[tuple[float, Array]]:
-    """Return pairs (moment, unit axis (3,)) of ∫ x xᵀ dm = ½ tr(J) 1 − J for an inertia tensor J (3, 3).
-
-    A rigid body has the rotary inertia of directors along these axes with these moments; zero ones are left out.
-    """
+    """Return pairs (moment, unit axis (3,)) of ∫ x xᵀ dm = ½ tr(J) 1 − J of an inertia tensor J; no zero ones."""
     J = np.asarray(inertia, dtype=float)
     E = 0.5 * np.trace(J) * np.eye(3) - J
     size = np.max(np.abs(J))

@@ -90,7 +90,7 @@ def test_diagram_in_the_fixed_frame() -> None:
     (draw,) = diagram.drawings().values()
     figure = draw()
     check(figure)
-    assert {b["label"] for b in diagram.summary["branches"]} <= {text.get_text() for text in figure.axes[0].texts}
+    assert set(diagram.labels) <= {text.get_text() for text in figure.axes[0].texts}
     circles = [c for line in figure.axes[0].lines if line.get_marker() == "o" for c in line.get_xydata()]
     assert [c[0] for c in circles[:2]] == [c.speed for c in diagram.critical_speeds[:2]]
     np.testing.assert_allclose(*np.array(circles[:2]).T)  # whirl as fast as the spin
@@ -177,6 +177,16 @@ def test_damped_bearings(theory: str, speed: float) -> None:
     expected = roots[np.argmax(roots.imag)]
     for row in rows:
         np.testing.assert_allclose([row["frequency"], row["growth"]], [expected.imag, expected.real], rtol=5e-5)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_damping_by_mode_of_a_shaft_is_external(theory: str) -> None:
+    """The modes at rest on their bearings have the ratio, and a Jeffcott rotor keeps it at any speed: 1e-4."""
+    for speed in (0.0, 200.0):
+        motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+        scene = shaft_on_bearings(2e4, motion=motion, model={"theory": theory})
+        scene["structure"]["damping"] = {"modal": 0.02}
+        np.testing.assert_allclose([row["damping"] for row in rotfem.modes(scene).rows], 0.02, rtol=1e-4)
 
 
 def test_cross_coupling_makes_forward_whirl_grow() -> None:
@@ -294,7 +304,7 @@ def test_bearings_and_a_shaft_that_both_differ_by_direction_are_refused() -> Non
         ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
         ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
         ({"supports": [{"x": 0.5}]}, "structure.root.driven"),
-        ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, -2.0]]}]}, "structure.supports.0.stiffness"),
+        ({"supports": [{"x": 0.5, "stiffness": [[100.0, 1e7], [200.0, 2e7]]}]}, "structure.supports.0.stiffness"),
         ({"precone": 0.1}, "structure.supports"),
         ({"root": {"driven": True, "lag_stiffness": 1.0}}, "structure.root.driven"),
     ],
@@ -532,6 +542,23 @@ def test_bearings_over_speed_have_the_modes_of_their_values() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
+def test_tables_say_where_they_end() -> None:
+    """Every verb has a warning of what is beyond a table, and none within it."""
+    scene = shaft_on_bearings(
+        {"over_speed": [[0.0, 1e4], [60.0, 2e4]]}, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]}
+    )
+    load = {"tip_force": {"harmonic": {"amplitude": [0.0, 1.0, 0.0], "frequency": 1e-3}}}
+    for speed, there in ((50.0, False), (70.0, True)):
+        at = scene | {"motion": {"type": "constant", "speed": speed, "axis": [1, 0, 0]}}
+        found = [rotfem.run(at), rotfem.modes(at), rotfem.unbalance(at, [10.0, speed]), rotfem.explain(at)]
+        found += [
+            rotfem.campbell(at, [10.0, speed], only=True),
+            rotfem.response(at | {"loads": load}, 1.0, 2.0, number=2),
+        ]
+        for result in found:
+            assert any("supports.0.stiffness is a table" in text for text in result.summary["warnings"]) == there
+
+
 def test_bearings_over_frequency_are_those_of_each_whirl() -> None:
     """A stiffness k + a ω²: half the disk on it is heavier, k̂(ω) = k_s (k + aω²)/(k_s + k + aω²) = m/2 ω²; 1e-4."""
     k, a, k_s, half = 2e4, 3.0, 24.0 * EI, 5.0
@@ -549,7 +576,7 @@ def test_bearings_over_frequency_are_those_of_each_whirl() -> None:
     ("support", "key"),
     [
         ({"stiffness": [[100, 1e7], [200, 2e7]]}, "stiffness.*over_speed"),
-        ({"stiffness": {"over_speed": [[10, 1.0], [5, 2.0]]}}, "over_speed.*increase"),
+        ({"stiffness": {"over_speed": [[10, 1.0], [5, 2.0]]}}, "over_speed.*decrease"),
         ({"stiffness": {"over_speed": [[10, 1.0, 2.0, 3.0], [15, 2.0, 1.0, 1.0]]}}, "over_speed"),
         ({"stiffness": {}}, "exactly one"),
         ({"stiffness": 1.0, "housing": [{"mass": -1.0, "stiffness": 1.0}]}, "housing.0.mass"),
@@ -592,7 +619,7 @@ def test_disk_is_its_mass_and_inertias() -> None:
     )
     np.testing.assert_allclose(one, other, rtol=1e-12)
     scene["structure"]["masses"] = [{"x": 0.5, "mass": 1.0, "offset": [0.0, 1e-4]}]
-    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset.*\[x, y, z\]"):
+    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset"):
         rotfem.Scene.from_dict(scene)
 
 
@@ -635,7 +662,8 @@ def test_housings_in_series() -> None:
     of = rotfem.unbalance(scene, [speed, 61.0])
     np.testing.assert_allclose(of.at(0.5)["major"][0], abs(u[0]), rtol=1e-4)
     np.testing.assert_allclose(of.at(1.0)["f2"][0], both * abs(u[0] - u[1]), rtol=1e-4)
-    history = rotfem.run(scene | {"time": {"end": 0.01, "step": 0.001}, "motion": {**scene["motion"], "speed": speed}})
+    start = {"initial": {"mode": 1, "amplitude": 1e-4}, "time": {"end": 0.01, "step": 0.001}}
+    history = rotfem.run(scene | start | {"motion": {**scene["motion"], "speed": speed}})
     assert history.status == "done"
     assert not any("housing" in name for name in history.history)
 
@@ -757,6 +785,29 @@ def test_threshold_of_internal_damping_is_found() -> None:
     np.testing.assert_allclose(found.speed, omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2)), rtol=1e-3)
 
 
+def test_map_of_critical_speeds_over_the_bearings() -> None:
+    """√(k_s k/(k_s + k)/(m/2)), half the disk on shaft and bearing, without the damping that the scene has: 1e-4."""
+    scene = shaft_on_bearings(1e4, 300.0, mesh={"elements": 4, "degree": 3})
+    scene["structure"]["section"] |= {"mass_per_length": 1e-3}
+    diagram = rotfem.campbell(scene, "0:100:3", map="structure.supports.*.stiffness=1e3:1e7:5")
+    rows, k_s = diagram.data()["critical_map"].values, 24.0 * EI
+    k = np.array(rows["value"])
+    np.testing.assert_allclose(np.unique(k), np.geomspace(1e3, 1e7, 5))
+    np.testing.assert_allclose(rows["speed"], np.sqrt(k_s * k / (k_s + k) / 5.0), rtol=1e-4)
+    assert sorted(set(rows["label"])) == ["1st backward whirl", "1st forward whirl"]
+    figure = diagram.plot(drawing="critical_map")
+    check(figure)
+    (axis,) = figure.axes
+    assert (axis.get_xlabel(), axis.get_xscale()) == ("stiffness of the supports (N/m)", "log")
+    assert (axis.get_ylabel(), axis.get_yscale()) == ("undamped critical speed (rad/s)", "log")
+    np.testing.assert_allclose(sorted({*axis.lines[0].get_ydata()}), sorted({*rows["speed"]})[::2], rtol=1e-6)
+    with pytest.raises(rotfem.SceneError, match="--map.*FIRST:LAST"):
+        rotfem.campbell(scene, "0:100:3", map="structure.supports.*.stiffness=1e3")
+    scene["structure"]["supports"][0]["stiffness"] = {"over_speed": [[0.0, 1e4], [50.0, 2e4]]}
+    with pytest.raises(rotfem.SceneError, match="map.*constant"):
+        rotfem.campbell(scene, "0:100:3", map={"structure.supports.1.stiffness": [1e4, 1e5]})
+
+
 def film_bearings() -> dict[str, Any]:
     """Return a disk on a shaft on oil films at 4000 rpm."""
     film = {"stiffness": [[2.1e7, 3e6], [-4e6, 3.2e7]], "damping": [[4e4, -1.1e4], [-0.9e4, 6e4]]}
@@ -794,3 +845,40 @@ def test_every_table_says_its_frame() -> None:
     for row in unequal.rows:
         both = sorted([row["frequency_fixed"], row["frequency_fixed_2"]])
         np.testing.assert_allclose(both, sorted([abs(row["frequency"] - 50.0), row["frequency"] + 50.0]))
+
+
+def test_shafts_are_drawn_as_they_are_built() -> None:
+    """A step, a bore, a disk and a support where they are; modes with orbits as wide as their shapes."""
+    scene = spinning_shaft()
+    section = {
+        "shape": "tube",
+        "E": 2e11,
+        "nu": 0.3,
+        "rho": 7800.0,
+        "inner_radius": [[0, 0], [6, 0], [6, 0.02], [10, 0.02]],
+    }
+    scene["structure"]["section"] = section | {"outer_radius": [[0, 0.05], [4, 0.05], [4, 0.08], [10, 0.08]]}
+    scene["structure"]["masses"] = [{"x": 7.0, "disk": {"outer_diameter": 1.0, "width": 0.1, "rho": 7800.0}}]
+    figure = rotfem.check(scene).plot()
+    check(figure)
+    axis = figure.axes[0]
+    lines = [np.asarray(line.get_xydata(), dtype=float) for line in axis.lines]
+    edge = lines[0]
+    for x, radius in ((3.99, 0.05), (4.01, 0.08)):
+        np.testing.assert_allclose(np.interp(x, *edge.T), radius, rtol=1e-9)
+    assert np.interp(4.01, *edge.T) == pytest.approx(0.08)
+    (disk,) = axis.patches
+    box = [disk.get_x(), disk.get_y(), disk.get_width(), disk.get_height()]
+    np.testing.assert_allclose(box, [6.95, -0.5, 0.1, 1.0], rtol=1e-9)
+    ends = [line[0].tolist() for line in lines if len(line) == 1 and line[0, 1] < 0.0]
+    assert ends == [[0.0, -0.05], [10.0, -0.08]]
+    found = rotfem.modes(scene)
+    figure = found.plot()
+    check(figure)
+    assert [a.name for a in figure.axes] == ["3d"] * 4
+    assert all(row["label"] in a.get_title() for row, a in zip(found.rows, figure.axes, strict=True))
+    (shape, *_), axes = found.shapes.values(), figure.axes[0]
+    orbits = [np.array(line.get_data_3d()) for line in axes.lines if len(line.get_data_3d()[0]) == 60]
+    widths = [np.hypot(*orbit[1:]).max() for orbit in orbits]
+    at = [np.flatnonzero(shape["x"] == orbit[0, 0])[0] for orbit in orbits]
+    np.testing.assert_allclose(widths, np.abs(shape["u2"] + 1j * shape["u2_imag"])[at], rtol=1e-2, atol=1e-6)

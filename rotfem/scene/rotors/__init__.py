@@ -1,0 +1,1 @@
+"""Rotor files of other programs."""
