@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -21,7 +20,7 @@ from rotfem.accuracy.modes import modal_errors
 from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep, synchronous
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import over_range
-from rotfem.commands.advice import frozen_inputs
+from rotfem.commands.advice import beyond, frozen_inputs
 from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of
@@ -116,7 +115,7 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds).replace(given)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
 
-    def compute(variant: Scene) -> CampbellResult:
+    def compute(variant: Scene, *_: Any) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
         analysis = analysis_of(variant, problem, comm)
         kept = None if folder is None or analysis.comm.size > 1 else FinishedSpeeds(folder, variant)
@@ -125,7 +124,7 @@ def campbell(
             result.summary["map"] = critical_map(variant, *mapped(map), max(-values[0], values[-1]), comm)
         return result
 
-    return answered(scene, compute, comm, "campbell")
+    return answered(scene, compute, comm, terms, top=True)
 
 
 def mapped(given: Mapping[str, Sequence[float]] | str) -> tuple[str, list[float]]:
@@ -176,12 +175,10 @@ def diagram(
     sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
     if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
-    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if sweep.model is None:
-            left = [speed for speed in values if speed not in sweep.known]
-            sweep.known |= solved_by_all(analysis, left, count, progress)
-            sweep.solves += len(left)
-        sweep.each = partial(shared_out, comm=analysis.everyone)
+    if analysis.everyone.size > analysis.comm.size and sweep.model is None:  # each process has a copy
+        left = [speed for speed in values if speed not in sweep.known]
+        sweep.known |= solved_by_all(analysis, left, count, progress)
+        sweep.solves += len(left)
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))
@@ -210,6 +207,7 @@ def diagram(
     warnings = [
         *advice(analysis, fastest),
         *frozen_inputs(analysis.problem),
+        *beyond(analysis.problem, *([row[name] for row in rows] for name in ("speed", "frequency"))),
         *remarks(sweep, labels, onsets),
         *(f"at {speed_text(last.speed)}, {text}" for text in doubtful([r for r in rows if r["speed"] == last.speed])),
         *([] if stopped is None else [f"{done}{speed_text(last.speed)}{goes_on}"]),
@@ -296,8 +294,7 @@ class FinishedSpeeds:
         out = dict[float, Spinning]()
         for i, speed in enumerate(arrays["speeds"].tolist() if str(arrays["key"]) == self._key else []):
             q, *pairs = (arrays[f"{name}_{i}"] for name in ("q", *PAIRS))
-            pencil, clamped = analysis.pencils(speed, q)
-            out[speed] = Spinning(speed, q, pencil, Eigenpairs(*pairs), clamped, bool(arrays["rigid"][i]))
+            out[speed] = analysis.restored(speed, q, Eigenpairs(*pairs), bool(arrays["rigid"][i]))
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
@@ -325,13 +322,13 @@ def solved_by_all(
     """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
     before, ranks = list[Spinning](), analysis.everyone.size
 
-    def solve(speed: float) -> Spinning:
-        before.append(analysis.at(speed, count + SPARE, before[-1] if before else None))
+    def solve(speed: float) -> tuple[Any, ...]:
+        before.append(found := analysis.at(speed, count + SPARE, before[-1] if before else None))
         if progress is not None:
             progress(min(1.0, len(before) * ranks / len(values)))
-        return before[-1]
+        return speed, found.q, found.pairs, found.rigid, found.reference  # which another process can have
 
-    return dict(zip(values, shared_out(values, solve, analysis.everyone), strict=True))
+    return {found[0]: analysis.restored(*found) for found in shared_out(values, solve, analysis.everyone)}
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:

@@ -191,10 +191,7 @@ class Problem:
 
 
 def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
-    """Return the names of the unknowns that stay zero at all times of a history; empty where none is known to.
-
-    The history starts undeformed, or in balance with what acts at t = 0.
-    """
+    """Return the unknowns that stay zero in a history that starts undeformed or in balance, as far as known."""
     structure: Any = resolved(structures[problem.structure.type].discretised)
     if not _is_built_in(problem) or problem.frame == "inertial" or problem.motion.pitch is not None:
         return ()

@@ -40,7 +40,7 @@ from rotfem.numerics.linear import (
     unknown_scale,
     use_direct_solver,
 )
-from rotfem.numerics.projection import Sendable, sparse_part, summed, times
+from rotfem.numerics.projection import sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -168,13 +168,6 @@ def mirrored(values: Array, right: Array) -> Array:
 def matched(values: Array, others: Array, vectors: Array) -> Array:
     """Return the left vectors from the right ones of the transposed pencil: y(λ) = conj of its vector at λ."""
     return _pick(vectors, others, values).conj()
-
-
-def mirror_error(values: Array) -> float:
-    """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
-    inner = values[(np.abs(values) <= np.median(np.abs(values))) & (values != 0.0)]  # 0 mirrors itself
-    distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
-    return float(np.max(distance / np.abs(inner), initial=0.0))
 
 
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
@@ -306,7 +299,7 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     return values, X, np.where(np.isfinite(errors), errors, 1.0)
 
 
-class Pencil(Sendable):
+class Pencil:
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
     Args:
@@ -338,7 +331,6 @@ class Pencil(Sendable):
         self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
-        self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X for complex columns X, or a vector, of locally owned unknowns."""
@@ -423,7 +415,6 @@ class Pencil(Sendable):
             return self._damped(count, target)
         if self.conservative:
             left = mirrored(values, right)
-            self.spectrum_error = mirror_error(values)
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = matched(values, *self._right(M, C, K, count, target)[:2])

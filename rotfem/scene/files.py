@@ -60,10 +60,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_override(file: str, override: str) -> tuple[str, Any]:
-    """Return key and value of an override such as `model.theory=linear`.
-
-    The value is read as TOML where that is possible and is a string otherwise.
-    """
+    """Return key and value of an override such as `model.theory=linear`; the value is TOML, or else a string."""
     key, equals, text = (part.strip() for part in override.partition("="))
     if not equals or not text or not _KEY.fullmatch(key):
         raise SceneError(file, allowed=f"override {show(override)} must have the form table.key=value")

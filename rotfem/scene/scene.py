@@ -244,10 +244,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 
 
 def with_shown(tables: dict[str, Any], what: str, given: object) -> dict[str, Any]:
-    """Return a scene's tables with the unit of a text as output.speed or output.frequency.
-
-    They stay as they are where they have that key, or the text has no unit that it may be.
-    """
+    """Return a scene's tables with the unit of a text, if any, as output.speed or .frequency that is not given."""
     output, unit = tables.get("output", {}), unit_of(given) if isinstance(given, str) else ""
     if not isinstance(output, Mapping) or what in output or unit not in get_args(AngularUnit):
         return tables

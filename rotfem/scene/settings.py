@@ -205,10 +205,7 @@ def estimates_error(scheme: type) -> bool:
 
 
 def usual(given: Mapping[str, Any]) -> str:
-    """Return the name of the scheme of a [time] table that names none, by what it gives.
-
-    Fixed steps are generalised-α's; to a tolerance one of higher order needs far fewer steps.
-    """
+    """Return the scheme of a [time] table that names none: generalised-α for fixed steps, esdirk4 for a tolerance."""
     fixed = "generalised_alpha"
     of_fixed = any(key in given for key in parameters_of(registry.schemes[fixed]))
     return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed

@@ -55,6 +55,10 @@ Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 Rows = tuple[tuple[Number, ...], ...]
 
 
+#: Length of a jump in time, as a part of the largest time of its table.
+JUMP = 1e-11
+
+
 def check_increasing(rows: Any) -> Any:
     """Return rows; refuse fewer than two of them, and a first column that does not increase strictly."""
     if isinstance(rows, float):
@@ -64,6 +68,14 @@ def check_increasing(rows: Any) -> Any:
         if after == before:
             raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} twice")
     return rows
+
+
+def check_times(rows: Any) -> Any:
+    """Return rows (t, …) at least JUMP of the largest |t| (s) apart: two of one t are a ramp that keeps its digits."""
+    out, width = [check_span(rows)[0]], JUMP * max(abs(rows[0][0]), abs(rows[-1][0]))
+    for t, *values in rows[1:]:
+        out.append((max(t, out[-1][0] + width), *values))
+    return tuple(out)
 
 
 def check_span(rows: Any) -> Any:
@@ -101,8 +113,8 @@ Span = Annotated[
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
 #: A number, or a taper from x = 0, in which two rows of one x are a step.
 Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start)]
-#: Rows (t, value), t (s) strictly increasing.
-TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_increasing)]
+#: Rows (t, value), t (s) increasing.
+TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_times)]
 
 
 def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:
@@ -120,10 +132,7 @@ def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) 
 
 
 def symmetric(size: int, definite: bool) -> AfterValidator:
-    """Return what refuses matrices, of a table too, that are not symmetric and positive definite or semidefinite.
-
-    Symmetry is to 1e-9 of the largest entry.
-    """
+    """Return what refuses matrices that are not symmetric, to round-off, and positive (semi)definite."""
 
     def fits(rows: Any) -> bool:
         if [len(row) for row in rows] != [size] * size:
@@ -163,10 +172,7 @@ def is_table(value: object) -> bool:
 
 
 def evaluate(value: Any, x: npt.ArrayLike) -> Array:
-    """Return a number, point or matrix, or a table of them over the span, at positions x (m), any shape (…).
-
-    Tables are linear between their rows, entry by entry. The shape is (…, *shape of the value).
-    """
+    """Return a number, point or matrix, or a table of them, at x (m): (…, *shape of the value)."""
     positions = np.asarray(x, dtype=np.float64)
     if not is_table(value):
         entry = np.asarray(value, dtype=np.float64)

@@ -92,10 +92,7 @@ def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
 
 
 def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] = ()) -> PlateGrid:
-    """Return 0 ≤ x ≤ length, |y| ≤ width/2 with even cells.
-
-    The knots of a tapered thickness and stations of the loads (m) are mesh lines.
-    """
+    """Return 0 ≤ x ≤ length, |y| ≤ width/2 in even cells, with lines at knots of thickness and loads (m)."""
     cell = mesh.CellType.quadrilateral if grid.cell == "quadrilateral" else mesh.CellType.triangle
     knots = tuple(x for x, _ in data.thickness[1:-1]) if isinstance(data.thickness, tuple) else ()
     lines = beam_nodes(data.length, grid.elements[0], apart((*knots, *stations), data.length))

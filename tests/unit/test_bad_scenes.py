@@ -48,7 +48,7 @@ motion.axis=[0,1,0] -> planar_beam
 motion.axis=[0,1] -> more entries
 motion.base_acceleration=[0,0,1] -> third component
 motion={type='spin_up', speed=6.0, duration=0} -> @motion.duration greater than 0
-motion={type='table', table=[[0,1],[1,1],[1,2]]} -> @motion.table increase strictly
+motion={type='table', table=[[0,1],[1,1],[0.5,2]]} -> @motion.table must not decrease
 motion={type='table', table='no.csv'} -> @motion.table file not found
 motion={type='torque', hub_inertia=1.0, pulses=[[1,1,1]]} -> @motion.pulses must end after
 motion={type='torque', hub_inertia=1.0, pulses=[[0,1,1]], table=[[0,1],[1,1]]} -> @motion.table give one of
