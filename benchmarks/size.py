@@ -28,7 +28,7 @@ CAPABILITIES = {
     "time integration": """
         analysis.dense_output analysis.first_motion analysis.march analysis.schemes analysis.time_grid
     """,
-    "loads": "mechanics.loads scene.load structures.applied_loads structures.plate_loads",
+    "loads": "mechanics.loads scene.load",
     "modes and other analyses": "analysis",
     "commands": "commands",
     "equations": "equations",

@@ -91,8 +91,9 @@ class SceneError(InputError):
         file = printable(self.file)
         if not others:
             return f"{file}: {first}"
-        lines = [f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others[:_MOST_PROBLEMS])]
-        return "\n".join(lines if len(others) <= _MOST_PROBLEMS else [*lines, "  …"])
+        return "\n".join(
+            [f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others[:_MOST_PROBLEMS])]
+        )
 
 
 class ComputationError(RuntimeError):

@@ -40,8 +40,6 @@ class Registry(Generic[E]):
     def add(self, entry: E) -> None:
         """Add an entry."""
         self._load()
-        if not isinstance(entry.name, str) or not entry.name.isidentifier():
-            raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
         if entry.name in self._entries:
             raise ValueError(f"{entry.name!r} is the name of another {self.kind} already")
         self._entries[entry.name] = entry
@@ -101,13 +99,9 @@ def register(entry: Entry | type[Entry]) -> None:
             `Scheme` or `MotionLaw`.
 
     Raises:
-        TypeError: it is none of these.
-        ValueError: its name is taken, or no name.
+        ValueError: its name is taken.
     """
-    registry = getattr(entry, "registry", None)
-    if not isinstance(registry, Registry):
-        raise TypeError(f"{entry!r} is none of what can be registered: cannot be registered")
-    registry.add(entry)
+    entry.registry.add(entry)
 
 
 def resolved(function: str | Callable[..., Any]) -> Callable[..., Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from types import FunctionType
 from typing import Any
 
@@ -29,12 +29,5 @@ def short(name: str, values: dict[str, Any]) -> str:
 
 
 def short_fields(self: Any) -> str:
-    """Return the repr of a dataclass: fields that differ from their defaults. For `__repr__` in its body."""
-    shown = {}
-    for field in (field for field in fields(self) if field.repr):
-        value, default = getattr(self, field.name), field.default
-        if field.default_factory is not MISSING:
-            default = field.default_factory()
-        if default is MISSING or type(value) is not type(default) or repr(value) != repr(default):
-            shown[field.name] = value
-    return short(type(self).__name__, shown)
+    """Return the repr of a dataclass, for `__repr__` in its body."""
+    return short(type(self).__name__, {field.name: getattr(self, field.name) for field in fields(self)})

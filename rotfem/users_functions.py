@@ -33,10 +33,7 @@ def number_of(function: Callable[..., Any], key: str, of: str) -> Callable[..., 
 
 
 def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: bool = False) -> Callable[..., Array]:
-    """Return a user's function that returns an array (size,), and refuses to return anything else.
-
-    Two components get a third one, zero, where there are three.
-    """
+    """Return a user's function that returns an array (size,), of two components with a third one, and nothing else."""
     needed = "a number" if size == 1 else f"{size} numbers"
 
     def at(*arguments: Any) -> Array:

@@ -7,20 +7,19 @@
    both (see `rotfem.analysis.reduced_basis`), in steps as small as it takes. A veering then shows itself as two
    branches that keep their order, a true crossing as two that change it.
 4. A speed is inserted where that leaves a branch ambiguous, or where the model is unstable in another way than both.
-5. A branch meets kΩ where it does so in the model. The modes are solved there, and dλ/dΩ gives the last step.
-6. An instability begins and ends where it does so in the model. The modes are solved there, and the model with them
-   gives the next place.
+5. A branch meets kΩ where it does so in the model. The modes are solved there, and the slope of the model gives the
+   next place. Where an instability begins and ends is found likewise, by halving.
 
-Where the model is that of a basis over the whole range, it is exact, and nothing more is solved in 4 to 6.
+Where the model is that of a basis over the whole range, it is exact, and nothing more is solved in 4 and 5.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -46,9 +45,9 @@ SURE, AMBIGUOUS = 0.9, 0.5
 #: most of its steps: a veering takes 34.
 FINEST, MOST_STEPS = 1e-5, 200
 
-#: Relative error of zeros of a model; in parts of the distance of two speeds, the error of those that only say where to
-#: solve, and the last step of Newton's method: its error is about the square, 1e-7. Solutions for a zero, usually one.
-ZEROS, FIRST, LAST, SOLUTIONS = 1e-11, 1e-6, 3e-4, 5
+#: Relative error of zeros of a model; in parts of the distance of two speeds, the last step of Newton's method, whose
+#: error is about the square, 1e-7, and that of differences in it. Solutions for a zero, usually one.
+ZEROS, LAST, NEAR, SOLUTIONS = 1e-11, 3e-4, 1e-4, 5
 
 #: Least distance of a node of a model from others, in parts of that of two speeds: round-off of the matrices is
 #: multiplied by about its reciprocal.
@@ -221,21 +220,18 @@ class BranchPath:
         assign(self.inside(before), point)
         return point
 
-    def zeros(self, f: Callable[[SpeedPoint], float], error: float) -> Iterator[float]:
-        """Yield the speeds between where a function of a point changes its sign, to an error in rad/s.
+    def zero(self, f: Callable[[SpeedPoint], float], low: SpeedPoint, high: SpeedPoint) -> float | None:
+        """Return the speed between two points where a function of a point changes its sign.
 
         Where it jumps, as from one mode to another that round-off confuses, there is none.
         """
-        known = {p.speed: f(p) for p in self.points}
+        known = {low.speed: f(low), high.speed: f(high)}
 
         def g(x: float) -> float:
             return known[x] if x in known else f(self.joined(self.model.modes(x)))
 
-        for low, high in pairwise(known):
-            if known[low] * known[high] < 0.0:
-                speed = float(brentq(g, low, high, xtol=max(error, 1e-300), rtol=ZEROS))
-                if abs(g(speed)) < 1e-2 * min(abs(known[low]), abs(known[high])) + 1e-6 * abs(speed):
-                    yield speed
+        speed = float(brentq(g, *known, xtol=1e-300, rtol=ZEROS))
+        return speed if abs(g(speed)) < 1e-2 * min(map(abs, known.values())) + 1e-6 * abs(speed) else None
 
 
 class Sweep:
@@ -249,7 +245,6 @@ class Sweep:
 
     Attributes:
         known: speed ↦ modes there that are solved already.
-        each: (items, work) ↦ what the work makes of every item; processes may share them out.
         paths: between each two points.
         solves, inserted: speeds solved, and those that are points though they were not asked for.
     """
@@ -257,7 +252,6 @@ class Sweep:
     def __init__(self, analysis: ModalAnalysis, count: int, only: bool = False, model: SpeedModel | None = None):
         self.analysis, self.count, self.only, self.model = analysis, count, only, model
         self.known: dict[float, Spinning] = {}
-        self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
         self.points, self.paths = list[SpeedPoint](), list[BranchPath]()
         self.solves = self.inserted = 0
         self.ambiguous: list[dict[str, float]] = []
@@ -351,88 +345,72 @@ class Sweep:
         """
         static = [(r["speed"], r["until"] or np.inf) for r in ranges if r["kind"] == "static instability"]
         speeds = [point.speed for point in self.points]
-        own = synchronous(self.analysis, speeds[0], speeds[-1], self.count)
-        wanted = list[tuple[int, int, int | None]]()
-        out = [
-            self._critical(-1, way, 1, 1, x) | {"label": f"{n}{ordinal_ending(n)} {way} whirl"}
-            for x, way, n in own or ()
-        ]
-        for i, right in enumerate(self.points[1:]):
-            for b in range(self.count):
-                wave = self.wave(right, b)
-                against = 0 if wave is None else wave.at_rest
-                known = {1} if own is not None and wave is not None and wave.number else set()
-                wanted += [(i, b, k) for k in (None, *sorted({*orders, against} - {0} - known))]
-        for (i, b, k), (speeds, solves) in zip(wanted, self.each(wanted, self._meetings), strict=True):
-            self.solves += solves
-            if not speeds:
-                continue
+        own = synchronous(self.analysis, max(-speeds[0], speeds[-1]), self.count)
+        out: list[dict[str, Any]] = []
+
+        def add(branch: int, kind: str, order: int, k: int, speed: float, **more: str) -> None:
+            named = {"speed": speed, "kind": kind, "order": order, "per_rev": k}
+            out.append(named | {"branch": branch + 1, "frequency": k * abs(speed), **more})
+
+        for speed, way, n in own or ():
+            for signed in (x for x in (-speed, speed) if speeds[0] <= x <= speeds[-1]):
+                add(-1, way, 1, 1, signed, label=f"{n}{ordinal_ending(n)} {way} whirl")
+        for i, b in product(range(len(self.paths)), range(self.count)):
             left, right = self.points[i : i + 2]
-            wave = self.wave(left if k is None else right, b)
-            way = self.direction(right, b)
-            for speed in speeds:
-                if k is None:
-                    if wave is not None and not wave.fixed:
-                        within = [ends for ends in static if ends[0] <= speed <= ends[1]]
-                        found = [end for end in (within[0] if within else [speed]) if np.isfinite(end)]
-                        out += [self._critical(b, "forward", 1, 0, end) for end in found]
-                elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and wave.number)):
-                    sense = way or ("forward" if wave.share > 0.0 else "backward")
-                    out.append(self._critical(b, sense, wave.number, k, speed))
-                elif k in orders:
-                    out.append(self._critical(b, "per_rev", k, k, speed))
+            before, wave, way = self.wave(left, b), self.wave(right, b), self.direction(right, b)
+            if before is not None and not before.fixed:
+                for speed in self._meetings(i, b, None):
+                    within = [ends for ends in static if ends[0] <= speed <= ends[1]]
+                    for end in filter(np.isfinite, within[0] if within else [speed]):
+                        add(b, "forward", 1, 0, end)
+            at_rest = 0 if wave is None else wave.at_rest
+            known = {1} if own is not None and wave is not None and wave.number else set[int]()
+            for k in sorted({*orders, at_rest} - {0} - known):
+                for speed in self._meetings(i, b, k):
+                    if wave is not None and k == at_rest and (way == "backward" or (wave.fixed and wave.number)):
+                        add(b, way or ("forward" if wave.share > 0.0 else "backward"), wave.number, k, speed)
+                    elif k in orders:
+                        add(b, "per_rev", k, k, speed)
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
 
-    def _critical(self, branch: int, kind: str, order: int, k: int, speed: float) -> dict[str, Any]:
-        frequency = k * abs(speed)
-        named = {"kind": kind, "order": order, "per_rev": k}
-        return {"speed": speed, **named, "branch": branch + 1, "frequency": frequency}
+    def _meetings(self, i: int, b: int, k: int | None) -> list[float]:
+        """Return the speeds after the point i where a branch b has the frequency kΩ, or without k passes zero.
 
-    @staticmethod
-    def _gap(point: SpeedPoint, b: int, k: int | None) -> float:
-        """Return how far a branch is above the line kΩ at a point, or without k above zero, rad/s."""
-        zero = point.order[b] >= 0 and point.spinning.pairs.bounds[point.order[b]] >= 1.0
-        omega = 0.0 if zero else point.signed(b)
-        return omega if k is None else abs(omega) - k * abs(point.speed)
-
-    def _meetings(self, place: tuple[int, int, int | None]) -> tuple[list[float], int]:
-        """Return the speeds after the point i where a branch b has the frequency kΩ, and solutions that took.
-
-        Without k it passes zero there. What has no frequency at rest is on all lines there.
+        What has no frequency at rest is on all lines there.
         """
-        i, b, k = place
-        before, self.solves, path = self.solves, 0, self.paths[i]
-        error = 0.0 if self.final else FIRST * (path.right.speed - path.left.speed)
-        found = [
-            speed if self.final else self._met(path, b, k, speed)
-            for speed in path.zeros(lambda point: self._gap(point, b, k), error)
-        ]
-        if self._gap(path.right, b, k) == 0.0 != self._gap(path.left, b, k) and path.right.speed != 0.0:
-            found.append(path.right.speed)
-        taken, self.solves = self.solves, before
-        return found, taken
+        path = self.paths[i]
 
-    def _met(self, path: BranchPath, b: int, k: int | None, speed: float) -> float:
-        """Return where a branch meets kΩ, from the speed at which the model does: Newton's method."""
+        def gap(point: SpeedPoint) -> float:
+            """Return how far the branch is above the line, rad/s."""
+            zero = point.order[b] >= 0 and point.spinning.pairs.bounds[point.order[b]] >= 1.0
+            omega = 0.0 if zero else point.signed(b)
+            return omega if k is None else abs(omega) - k * abs(point.speed)
+
+        pairs = [(low, high) for low, high in pairwise(path.points) if gap(low) * gap(high) < 0.0]
+        found = [speed for low, high in pairs if (speed := path.zero(gap, low, high)) is not None]
+        if not self.final:
+            found = [self._met(path, b, gap, speed) for speed in found]
+        if gap(path.right) == 0.0 != gap(path.left) and path.right.speed != 0.0:
+            found.append(path.right.speed)
+        return found
+
+    def _met(self, path: BranchPath, b: int, gap: Callable[[SpeedPoint], float], speed: float) -> float:
+        """Return where a branch b has no gap, from the speed at which it has none in the model: Newton's method."""
+        left, right = path.left.speed, path.right.speed
+        h = NEAR * (right - left)
         for _ in range(SOLUTIONS):
             try:
                 point = path.take(self.solve(speed, path.left.spinning, False).spinning)
             except ComputationError:  # K is singular: this is the speed
-                return speed
-            pairs, j, gap = point.spinning.pairs, point.order[b], self._gap(point, b, k)
-            if j < 0 or (k is not None and abs(gap) <= pairs.bounds[j] * abs(pairs.values[j])):
-                return speed
-            slope = path.model.slope(point.spinning, j).imag
-            if k is None:
-                slope = -slope if point.conjugate[b] else slope
-            else:
-                slope -= k * np.sign(speed)
-            step = -gap / slope
-            if not path.left.speed < speed + step < path.right.speed:
-                return speed
+                break
+            below, above = (gap(path.joined(path.model.modes(x))) for x in (speed - h, speed + h))
+            step = -gap(point) * 2 * h / (above - below)
+            pairs, j = point.spinning.pairs, point.order[b]
+            if abs(gap(point)) <= pairs.bounds[j] * abs(pairs.values[j]) or not left < speed + step < right:
+                break
             speed += step
-            if abs(step) <= LAST * (path.right.speed - path.left.speed):
-                return float(speed)
+            if abs(step) <= LAST * (right - left):
+                break
         return float(speed)
 
     def onsets(self) -> list[dict[str, Any]]:
@@ -460,47 +438,48 @@ class Sweep:
 
         Where growth begins or ends, round-off of a λ near zero may call it static or dynamic.
         """
-        low, high, speed = path.left.speed, path.right.speed, np.inf
-        count, least = len(path.left.spinning.pairs.values), 1e-9 * (high - low)  # a model has more modes
+        low, high, count = path.left.speed, path.right.speed, len(path.left.spinning.pairs.values)
+        least = 1e-9 * (high - low)
 
         def same(s: Spinning) -> bool:
-            kind = unstable(s.first(count))
+            kind = unstable(s.first(count))  # a model has more modes
             return kind == before if before and after else (kind is None) == (before is None)
 
-        for _ in range(SOLUTIONS):
-            last, a, b = speed, low, high
+        def place() -> float:
+            a, b = low, high
             while b - a > least:
                 middle = 0.5 * (a + b)
                 a, b = (middle, b) if same(path.model.modes(middle)) else (a, middle)
-            speed = b
-            if self.final or abs(speed - last) <= 1e-6 * abs(speed):
-                break
+            return b
+
+        speed = place()
+        for _ in range(0 if self.final else SOLUTIONS):
             try:
-                solved = self.solve(speed, path.left.spinning, False).spinning
+                path.take(self.solve(speed, path.left.spinning, False).spinning)
             except ComputationError:  # K is singular: this is the speed
                 break
-            path.take(solved)
-            low, high = (speed, high) if same(solved) else (low, speed)
-        grows = max((lam.real for lam, _ in growing(path.model.modes(a, count))), default=0.0)
+            last, speed = speed, place()
+            if abs(speed - last) <= 1e-6 * abs(speed):
+                break
+        grows = max((lam.real for lam, _ in growing(path.model.modes(speed - least, count))), default=0.0)
         typical = np.median(np.abs(path.left.spinning.pairs.values))
         return None if after is None and grows > 1e-2 * typical else speed
 
 
-def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) -> list[tuple[float, str, int]] | None:
-    """Return (speed, direction, number among those) of the critical speeds of an undamped shaft; None of other rotors.
+def synchronous(analysis: ModalAnalysis, top: float, count: int) -> list[tuple[float, str, int]] | None:
+    """Return (speed, direction, number in it) of the first critical speeds of an undamped shaft; None of other rotors.
 
     Whirl e^{iΩt} at the speed Ω, at which C = ΩG, is an eigenvector of (K − Ω² (M − iG)) x = 0; all three are constant
     and the pencil is Hermitian, so that one solution has all of them (Genta 2005, section 4.5), whatever the grid.
 
     Args:
         analysis: of the shaft.
-        low: first speed of the range, rad/s.
-        high: last speed.
+        top: a speed up to which the bearings are the same, rad/s.
         count: number of speeds, at most.
     """
-    top, names = max(abs(low), abs(high)), list(analysis.structure.unknowns)
+    names = list(analysis.structure.unknowns)
     free = np.tile([n not in ("u1", "theta1") for n in names], analysis.system.V.dofmap.index_map.size_local)
-    if not analysis.fixed or analysis.comm.size > 1 or len(free) > MOST_DENSE or top == 0.0 or analysis.kept.used:
+    if not analysis.fixed or analysis.comm.size > 1 or len(free) > MOST_DENSE or top == 0.0 or analysis.mixed.used:
         return None
     free[analysis.system.clamped] = False
     at = [analysis.pencils(speed, analysis.equilibrium(speed))[0] for speed in (0.0, top)]
@@ -525,7 +504,7 @@ def synchronous(analysis: ModalAnalysis, low: float, high: float, count: int) ->
         shares = np.linalg.eigvalsh(with_it.conj().T @ with_it - against.conj().T @ against)
         for speed, share in zip(found[group].tolist(), shares, strict=True):
             numbers[way := "forward" if share > 0.0 else "backward"] += 1
-            out += [(signed, way, numbers[way]) for signed in (-speed, speed) if low <= signed <= high]
+            out.append((speed, way, numbers[way]))
     return out[:count]
 
 

@@ -111,6 +111,7 @@ class March:
         reached: state that an earlier march has yielded, to go on from.
         observers: called with (old state, new state) after every accepted step or part of one.
         last: what the last solution of a stage says of the next one.
+        parts: steps that were taken, parts of steps counted each.
         substeps, rejected: steps that were halved as Newton failed, and adaptive ones that were rejected.
     """
 
@@ -126,7 +127,7 @@ class March:
         self.system, self.scheme, self.steps, self.newton = system, scheme, steps, newton
         self.reached: State | None = None
         self.observers = list[Observer]()
-        self.substeps = self.rejected = 0
+        self.parts = self.substeps = self.rejected = 0
         self._q, self._v = np.zeros_like(system.q.x.array) if q is None else q, v
         self.last = LastSolution()
 
@@ -173,6 +174,7 @@ class March:
                 yield state
 
     def _observed(self, old: State, new: State) -> None:
+        self.parts += 1
         for observe in self.observers:
             observe(old, new)
 

@@ -38,29 +38,33 @@ from rotfem.numerics.projection import sparse_part, summed
 Array = npt.NDArray[Any]
 
 
-class Resultants:
-    """The stiff strains of a system, compiled.
+class MixedModes:
+    """Modes of a system from its saddle form; compiled when it is first needed.
 
     Args:
         system: equations of motion of the structure, hub held, not moving.
+
+    Attributes:
+        used: whether it has kept more digits of some pairs.
     """
 
     def __init__(self, system: System):
-        self.system, self.model, self.V = system, system.model, system.V
-        m = self.model.mechanics
-        stiff = [s for s in m.strains if s.name in system.structure.stiff]
-        soft = [s for s in m.strains if s.name not in system.structure.stiff]
-        self._state = fem.Function(self.V)
-        self._rows = [self._compile(s) for s in stiff]
-        self._rest = self._compile_rest(stiff, soft)
-        self._stressed = self._compile_stressed()
+        self.system, self.model, self.V, self.used = system, system.model, system.V, False
+        self._state = fem.Function(system.V)
+
+    @cached_property
+    def _forms(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
+        """Forms of the rows of each stiff strain, of K_rest, and of `_compile_stressed`."""
+        strains, names = self.model.mechanics.strains, self.system.structure.stiff
+        stiff, soft = ([s for s in strains if (s.name in names) == wanted] for wanted in (True, False))
+        return [self._compile_row(s) for s in stiff], self._compile_rest(stiff, soft), self._compile_stressed()
 
     def _at_rest(self, form: Any) -> Any:
         q, v, a, _ = self.model.mechanics.k.functions
         zero = (q, v, a) if self.system.linear else (v, a)
         return forms.without(form, *zero)
 
-    def _compile(self, strain: Any) -> tuple[Any, Any]:
+    def _compile_row(self, strain: Any) -> tuple[Any, Any]:
         """Return the forms of R_C and W_C of one strain."""
         mesh, q = self.V.mesh, self.system.q
         shape, degree = ufl.as_ufl(strain.value).ufl_shape, strain.measure.metadata()["quadrature_degree"]
@@ -98,18 +102,19 @@ class Resultants:
         form = self._at_rest(out)
         return None if form.empty() else forms.form(form, once=True)
 
-    def at_state(self, M: Any, C: Any, unit: float) -> tuple[Pencil, Any]:
+    def _at_state(self, M: Any, C: Any, unit: float) -> tuple[Pencil, Any]:
         """Return the pencil over (x, e) at the state and time set in the system, given its M and C.
 
         With it the geometric stiffness of x per unit strain of the state, whose own round-off is one of numbers of
         order one; None of a state without stress.
         """
         system = self.system
+        each, rest_form, stressed_form = self._forms
         self._state.x.array[:] = system.q.x.array
         rest = system.A.duplicate()
-        if self._rest is not None:
+        if rest_form is not None:
             rest.zeroEntries()
-            fem_petsc.assemble_matrix(rest, self._rest, system.bcs, 0.0)
+            fem_petsc.assemble_matrix(rest, rest_form, system.bcs, 0.0)
             rest.assemble()
         if system.linear:
             cast(AffineSystem, system).add_other_stiffness(rest)
@@ -118,7 +123,7 @@ class Resultants:
         free.array[:] = 1.0
         free.array[system.clamped] = 0.0
         rows, blocks = [], []
-        for row, block in self._rows:
+        for row, block in each:
             R, W = (fem_petsc.assemble_matrix(form) for form in (row, block))
             R.assemble()
             W.assemble()
@@ -132,53 +137,18 @@ class Resultants:
         scale(pencil, rest, factors, unit)
         stressed = bool(np.any(self._state.x.array))
         has_stress = cast(AffineSystem, system).has_prestress if system.linear else stressed
-        if self._stressed is None or not system.comm.allreduce(has_stress, op=MPI.LOR):
+        if stressed_form is None or not system.comm.allreduce(has_stress, op=MPI.LOR):
             return pencil, None
-        stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
+        stressed = fem_petsc.assemble_matrix(stressed_form, system.bcs, 0.0)
         stressed.assemble()
         return pencil, stressed
-
-
-def _empty(A: Any) -> Any:
-    """Return a matrix of the size of a square one, without entries."""
-    out = PETSc.Mat().createAIJ((A.getSizes()[0], A.getSizes()[0]), nnz=0, comm=A.comm)
-    out.assemble()
-    return out
-
-
-def _bordered(corner: Any, rows: list[Any], blocks: list[Any]) -> Any:
-    """Return [[corner, R₁ᵀ, …], [R₁, W₁], …]; without rows that are None."""
-    grid = [[corner, *(None if R is None else R.transpose(PETSc.Mat()) for R in rows)]]
-    for i, (R, W) in enumerate(zip(rows, blocks, strict=True)):
-        grid.append([R, *(W if i == j else None for j in range(len(rows)))])
-    out = PETSc.Mat().createNest(grid, comm=corner.comm)
-    out.assemble()
-    return out.convert("aij")
-
-
-class KeptDigits:
-    """Modes of a system from its saddle form; compiled when it is first needed.
-
-    Args:
-        system: equations of motion of the structure, hub held.
-
-    Attributes:
-        used: whether it has kept more digits of some pairs.
-    """
-
-    def __init__(self, system: System):
-        self.system, self.used = system, False
-
-    @cached_property
-    def _resultants(self) -> Resultants:
-        return Resultants(self.system)
 
     def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
         """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them."""
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
         if worst <= DIGITS_LOST or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
             return pairs
-        kept, stressed = self._resultants.at_state(pencil.M, pencil.C, pencil.unit or 1.0)
+        kept, stressed = self._at_state(pencil.M, pencil.C, pencil.unit or 1.0)
         try:
             kept.overdamped = pencil.overdamped
             found = kept.first(count)
@@ -202,8 +172,25 @@ class KeptDigits:
             bounds = bounds + relative(round_off / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
-        pencil.spectrum_error, self.used = kept.spectrum_error, True
+        self.used = True
         return Eigenpairs(found.values, right, left, found.errors, bounds)
+
+
+def _empty(A: Any) -> Any:
+    """Return a matrix of the size of a square one, without entries."""
+    out = PETSc.Mat().createAIJ((A.getSizes()[0], A.getSizes()[0]), nnz=0, comm=A.comm)
+    out.assemble()
+    return out
+
+
+def _bordered(corner: Any, rows: list[Any], blocks: list[Any]) -> Any:
+    """Return [[corner, R₁ᵀ, …], [R₁, W₁], …]; without rows that are None."""
+    grid = [[corner, *(None if R is None else R.transpose(PETSc.Mat()) for R in rows)]]
+    for i, (R, W) in enumerate(zip(rows, blocks, strict=True)):
+        grid.append([R, *(W if i == j else None for j in range(len(rows)))])
+    out = PETSc.Mat().createNest(grid, comm=corner.comm)
+    out.assemble()
+    return out.convert("aij")
 
 
 def _digits(bounds: Array) -> float:

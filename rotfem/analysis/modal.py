@@ -24,7 +24,7 @@ import ufl
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.mixed_modes import KeptDigits
+from rotfem.analysis.mixed_modes import MixedModes
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import by_family, massed
 from rotfem.equations.system import System
@@ -88,13 +88,8 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
 
 
 def self_checks(spinning: Spinning) -> dict[str, float]:
-    """Return how far symmetry and the spectrum are from what theory says (relative).
-
-    M and K are symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ.
-    """
-    out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries.items()}
-    spectrum = spinning.pencil.spectrum_error
-    return out if spectrum is None else out | {"spectrum": spectrum}
+    """Return how far M and K are from symmetric and C from skew, relative: 0 without damping and follower loads."""
+    return {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries.items()}
 
 
 @dataclass
@@ -204,7 +199,7 @@ class ModalAnalysis:
         everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         notes: remarks on the way to equilibria.
-        kept: the same modes with the stiff strains as unknowns.
+        mixed: the same modes with the stiff strains as unknowns.
     """
 
     def __init__(
@@ -227,7 +222,7 @@ class ModalAnalysis:
         self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self._overdamped = 0 if self.fixed else None
-        self.kept = KeptDigits(self.system)
+        self.mixed = MixedModes(self.system)
         self.notes = list[str]()
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -267,7 +262,7 @@ class ModalAnalysis:
         pairs = pencil.first(count, clamped.scale() if self.free else 0.0)
         self._unit, self._overdamped = pencil.unit, pencil.overdamped
         if not self.free:
-            pairs = self.kept.better(pencil, pairs, count)
+            pairs = self.mixed.better(pencil, pairs, count)
         slowest = int(np.argmin(np.abs(pairs.values)))
         rigid = self.free and pairs.bounds[slowest] >= 1.0
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
@@ -288,6 +283,12 @@ class ModalAnalysis:
         if keep:
             pencil.factor = None
         return found
+
+    def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool, reference: Any = None) -> Spinning:
+        """Return what `at` has found before, or on another process, of its parts."""
+        self.system.count_rotations_from(reference)
+        pencil, clamped = self.pencils(speed, q)
+        return Spinning(speed, q, pencil, pairs, clamped, rigid, reference)
 
     def _at_own_frequencies(self, spinning: Spinning) -> None:
         """Solve every mode again with the supports as they are at its own frequency of whirl, in place.

@@ -6,21 +6,15 @@ which keeps symmetry and skewness. Over the speed Ω these are the polynomials t
 
 - In a linear theory they are of second degree in Ω, so three nodes make them exact. The basis grows until full
   solutions at speeds between agree, and all modes of a diagram are those of one model (`over_range`).
-- In the other theories two speeds that are solved, and those beside them, are the nodes (`between`). K is a polynomial
+- In the other theories two speeds that are solved, and those next to them, are the nodes (`between`). K is a polynomial
   of Ω² then, as the centrifugal force that the equilibrium follows.
-
-With left vectors y and right vectors x,
-
-    dλ/dΩ = − y^H (λ² M' + λ C' + K') x / [ y^H (2λ M + C) x ]
-
-(Adhikari & Friswell 2001).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,11 +23,10 @@ from numpy.linalg import norm
 from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, product
-from rotfem.equations.affine import AffineSystem
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
 from rotfem.numerics.linear import ROUNDED, unknown_scale
-from rotfem.numerics.projection import dense, orthonormal, spanned, summed, times
+from rotfem.numerics.projection import dense, spanned, summed, times
 from rotfem.numerics.ritz import heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -62,7 +55,7 @@ class SmallPencil(Pencil):
         if self.conservative:  # what a projection lacks of symmetry is round-off
             M, C, K = 0.5 * (M + M.T), 0.5 * (C - C.T), 0.5 * (K + K.T)
         self.M, self.C, self.K = M, C, K
-        self.comm, self.spectrum_error = MPI.COMM_SELF, None
+        self.comm = MPI.COMM_SELF
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X."""
@@ -118,28 +111,31 @@ class SmallPencil(Pencil):
 class SpeedModel:
     """The modes over speed of a small pencil, whose matrices are polynomials of speed.
 
+    The basis V is orthonormal in unknowns of comparable size, W its dual one, WᵀV = 1.
+
     Args:
-        V: basis, owned rows (n, m).
+        vectors: complex ones that the basis spans with their conjugates, owned rows (n, m).
         nodes: speed (rad/s) and pencil of each place that the polynomials go through.
         even: whether K is a polynomial of Ω², or else of Ω.
         count: number of modes.
-        dual: W, (n, m), with WᵀV = 1; None where no modes are given that are not in the basis.
 
     Attributes:
         lift: V, and M V at the first node.
         checks: speeds of full solutions, with the largest relative difference of a frequency there.
     """
 
-    def __init__(
-        self, V: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int, dual: Array | None = None
-    ):
-        self.count, self._even, self._dual = count, even, dual
+    def __init__(self, vectors: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int):
+        self.count, self._even = count, even
         self.checks: list[dict[str, float]] = []
         speeds, matrices, self._asymmetries = list[float](), list[list[Array]](), dict.fromkeys("MCK", 0.0)
         for speed, pencil in nodes:
+            if not speeds:
+                scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
+                inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]) / scale)
+                self.comm, V, self._dual = pencil.comm, scale * inner, inner / scale
             products = [times(A, V) for A in (pencil.M, pencil.C, pencil.K)]
             if not speeds:
-                self.comm, self.lift = pencil.comm, (V, products[0])
+                self.lift = (V, products[0])
             speeds.append(speed)
             self._overdamped = pencil.overdamped
             matrices.append([summed(pencil.comm, V.T @ AV) for AV in products])
@@ -190,36 +186,26 @@ class SpeedModel:
 
     def inside(self, s: Spinning) -> Spinning:
         """Return modes with their vectors in the basis."""
-        if s.lift is self.lift or self._dual is None:
+        if s.lift is self.lift:
             return s
         right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.right, s.lifted(s.pairs.left)))
         pairs, pencil = replace(s.pairs, right=right, left=left), self._pencil(s.speed)
         return Spinning(s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
 
-    def slope(self, s: Spinning, j: int) -> complex:
-        """Return dλ/dΩ of a mode in the basis."""
-        h = 1e-4 * float(np.ptp(self._speeds))  # of a polynomial of third degree it differs by 1e-8
-        M, C, K = (self._at(s.speed + h) - self._at(s.speed - h)) / (2 * h)
-        lam, x, y = s.pairs.values[j], s.pairs.right[:, j], s.pairs.left[:, j]
-        return complex(-(y.conj() @ (lam**2 * M + lam * C + K) @ x) / s.own[j, j])
 
-
-def between(solved: Sequence[Spinning], beside: Sequence[Spinning]) -> SpeedModel:
+def between(solved: Sequence[Spinning], neighbours: Sequence[Spinning]) -> SpeedModel:
     """Return the model between two speeds that are solved; it has their modes, but for round-off in K.
 
     Args:
         solved: modes at both speeds and at those solved between, by speed.
-        beside: modes at speeds beside them, of which those of the same sign are nodes too.
+        neighbours: modes at the speeds next to them, of which those of the same sign are nodes too.
     """
-    pencil, low, high = solved[0].pencil, solved[0].speed, solved[-1].speed
-    scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
+    low, high = solved[0].speed, solved[-1].speed
     # Left vectors of a conservative pencil are conjugate right ones, unless λ is real.
-    further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not pencil.conservative)] for s in solved]
-    vectors = np.hstack([*(s.pairs.right for s in solved), *further]) / scale
-    inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]))
-    nodes = {s.speed: s.pencil for s in (*solved, *beside) if s.speed * (low + high) >= 0.0}
-    count = max(len(s.pairs.values) for s in solved)
-    return SpeedModel(scale * inner, nodes.items(), low * high >= 0.0, count, inner / scale)
+    further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not s.pencil.conservative)] for s in solved]
+    vectors = np.hstack([*(s.pairs.right for s in solved), *further])
+    nodes = {s.speed: s.pencil for s in (*solved, *neighbours) if s.speed * (low + high) >= 0.0}
+    return SpeedModel(vectors, nodes.items(), low * high >= 0.0, max(len(s.pairs.values) for s in solved))
 
 
 def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> SpeedModel | None:
@@ -235,18 +221,16 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
 
     def solved(speed: float) -> Array:
         pairs = analysis.at(speed, count, keep=False).pairs
-        columns.extend([pairs.right.real, pairs.right.imag])
+        columns.append(pairs.right)
         return pairs.values
 
     def model() -> SpeedModel:
-        # Orthonormal in the inertia instead, directions that have none would be lost.
-        V = orthonormal(analysis.comm, np.hstack(columns), lambda X: times(cast(AffineSystem, system).material, X))
-        nodes = (first, 0.5 * (first + last), last)
-        return SpeedModel(V, ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in nodes), False, count)
+        nodes = ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in (first, 0.5 * (first + last), last))
+        return SpeedModel(np.hstack(columns), nodes, False, count)
 
     solved(first)
     solved(last)
-    if analysis.kept.used:  # which the model does not keep
+    if analysis.mixed.used:  # whose digits the model does not keep
         return None
     found = model()
     while gaps and len(checks) < 7:

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -18,7 +17,7 @@ from mpi4py import MPI
 from rotfem.accuracy.answer import Setting
 from rotfem.accuracy.errors import Errors, warnings_of
 from rotfem.accuracy.modes import modal_errors
-from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep
+from rotfem.analysis.branches import SPARE, SpeedPoint, Sweep, synchronous
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import over_range
 from rotfem.commands.advice import frozen_inputs
@@ -28,7 +27,7 @@ from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.commands.recorder import check_rows
-from rotfem.errors import ComputationError, SceneError, Stopped
+from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
@@ -36,7 +35,7 @@ from rotfem.results.campbell import CampbellResult
 from rotfem.results.files import json_text, writing
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST
-from rotfem.structures.mode_names import distinct
+from rotfem.structures.mode_names import distinct, ordinal_ending
 from rotfem.units import speed_text, split_unit
 from rotfem.version import __version__
 
@@ -74,6 +73,7 @@ def campbell(
     rated: float | str | None = None,
     operating: Sequence[float | str] | None = None,
     only: bool = False,
+    map: Mapping[str, Sequence[float]] | str | None = None,
     folder: Path | None = None,
     progress: Progress | None = None,
     hint: Hint | None = silent,
@@ -91,6 +91,9 @@ def campbell(
         operating: lowest and highest speed of operation, likewise.
         only: whether to solve only these speeds: none is inserted where branches are ambiguous, and critical speeds
             come from interpolation between them.
+        map: a scene key ↦ its values, or text such as "structure.supports.*.stiffness=1e6:1e9:20", spaced evenly on a
+            logarithmic scale: synchronous critical speeds of a shaft over them, without damping and unsymmetric
+            stiffnesses, are in `summary["map"]`.
         folder: where the modes of speeds that are finished are kept if it is interrupted, and taken from when the same
             is asked for again; None to keep none.
         progress: called with the share of the speeds done, between 0 and 1.
@@ -112,13 +115,48 @@ def campbell(
     scene = as_scene(scene).showing("speed", speeds).replace(given)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
 
-    def compute(variant: Scene) -> CampbellResult:
+    def compute(variant: Scene, *_: Any) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
         analysis = analysis_of(variant, problem, comm)
         kept = None if folder is None or analysis.comm.size > 1 else FinishedSpeeds(folder, variant)
-        return diagram(variant, analysis, values, started, progress, hint, only, kept)
+        result = diagram(variant, analysis, values, started, progress, hint, only, kept)
+        if map is not None:
+            result.summary["map"] = critical_map(variant, *mapped(map), max(-values[0], values[-1]), comm)
+        return result
 
-    return answered(scene, compute, comm, "campbell")
+    return answered(scene, compute, comm, terms, top=True)
+
+
+def mapped(given: Mapping[str, Sequence[float]] | str) -> tuple[str, list[float]]:
+    """Return the key and the values of a map of critical speeds."""
+    if not isinstance(given, str):
+        ((key, values),) = given.items()
+        return key, [float(value) for value in values]
+    key, _, text = given.partition("=")
+    with suppress(ValueError), np.errstate(invalid="ignore", divide="ignore"):
+        first, last, number = text.split(":")
+        found = np.geomspace(float(first), float(last), int(number))
+        if 0.0 < found[0] < found[-1] < np.inf:
+            return key, [float(value) for value in found]
+    why = "must be KEY=FIRST:LAST:NUMBER, as structure.supports.*.stiffness=1e6:1e9:20, with 0 < FIRST < LAST"
+    raise SceneError("command line", "--map", given, why)
+
+
+def critical_map(scene: Scene, key: str, values: Sequence[float], top: float, comm: MPI.Comm) -> dict[str, Any]:
+    """Return the first undamped critical speeds of a shaft over the values of a scene key: `key` and `rows`."""
+    rows = []
+    for value in values:
+        variant = scene.replace({key: value})
+        problem = Problem.of(variant).spinning()
+        kept = tuple(name for name in problem.effective_effects() if name not in ("damping", "support_dampers"))
+        analysis = analysis_of(variant, problem.replace(effects=kept), comm)
+        found = synchronous(analysis, top, scene.modes.count)
+        if found is None:
+            why = "is of round shafts that bearings of constant stiffness hold, with up to 2000 unknowns"
+            raise InputError("map", key, why)
+        named = ({"kind": way, "label": f"{n}{ordinal_ending(n)} {way} whirl", "speed": s} for s, way, n in found)
+        rows += [{"value": value, **row} for row in named]
+    return {"key": key, "rows": rows}
 
 
 def diagram(
@@ -137,12 +175,10 @@ def diagram(
     sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
     if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
-    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
-        if sweep.model is None:
-            left = [speed for speed in values if speed not in sweep.known]
-            sweep.known |= solved_by_all(analysis, left, count, progress)
-            sweep.solves += len(left)
-        sweep.each = partial(shared_out, comm=analysis.everyone)
+    if analysis.everyone.size > analysis.comm.size and sweep.model is None:  # each process has a copy
+        left = [speed for speed in values if speed not in sweep.known]
+        sweep.known |= solved_by_all(analysis, left, count, progress)
+        sweep.solves += len(left)
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))
@@ -257,8 +293,7 @@ class FinishedSpeeds:
         out = dict[float, Spinning]()
         for i, speed in enumerate(arrays["speeds"].tolist() if str(arrays["key"]) == self._key else []):
             q, *pairs = (arrays[f"{name}_{i}"] for name in ("q", *PAIRS))
-            pencil, clamped = analysis.pencils(speed, q)
-            out[speed] = Spinning(speed, q, pencil, Eigenpairs(*pairs), clamped, bool(arrays["rigid"][i]))
+            out[speed] = analysis.restored(speed, q, Eigenpairs(*pairs), bool(arrays["rigid"][i]))
         return out
 
     def save(self, points: Sequence[SpeedPoint]) -> None:
@@ -286,13 +321,13 @@ def solved_by_all(
     """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
     before, ranks = list[Spinning](), analysis.everyone.size
 
-    def solve(speed: float) -> Spinning:
-        before.append(analysis.at(speed, count + SPARE, before[-1] if before else None))
+    def solve(speed: float) -> tuple[Any, ...]:
+        before.append(found := analysis.at(speed, count + SPARE, before[-1] if before else None))
         if progress is not None:
             progress(min(1.0, len(before) * ranks / len(values)))
-        return before[-1]
+        return speed, found.q, found.pairs, found.rigid, found.reference  # which another process can have
 
-    return dict(zip(values, shared_out(values, solve, analysis.everyone), strict=True))
+    return {found[0]: analysis.restored(*found) for found in shared_out(values, solve, analysis.everyone)}
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:

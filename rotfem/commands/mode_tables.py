@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.results.modes import ModesResult
 from rotfem.structures.mode_names import Wave, distinct
@@ -18,40 +19,43 @@ Array = npt.NDArray[Any]
 
 
 def mode_tables(
-    analysis: ModalAnalysis,
-    speed: float,
-    count: int,
-    *,
-    keep: bool = True,
-    formats: tuple[str, ...] | None = None,
-    found: Spinning | None = None,
+    analysis: ModalAnalysis, spinning: Spinning, count: int, formats: tuple[str, ...] | None = None
 ) -> ModesResult:
     """Return the first modes at a speed, with warnings of the model and of instabilities."""
-    found = found or analysis.at(speed, count, keep=keep)
-    rigid = int(found.rigid)
-    spinning = found.first(count - rigid)
+    speed, rigid, structure = spinning.speed, int(spinning.rigid), analysis.structure
+    spinning = spinning.first(count - rigid)
     rows = mode_rows(analysis, spinning)
-    synchronous = critical(rows, speed, analysis.fixed)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous]
+    stability, warnings = remarks(analysis, spinning, rows)
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
     if rigid:  # hub and structure turn together, λ = 0
-        columns = rows[0] if rows else mode_rows(analysis, found.first(1))[0]
+        columns = rows[0] if rows else mode_rows(analysis, spinning.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
         rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
-    structure = analysis.structure
     summary = {
         **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
         **{"effects": list(analysis.model.effects), "modes": rows, "shapes": {"length": structure.length}},
-        "warnings": warnings,
+        **{"stability": stability.summary(), "warnings": warnings},
     }
     out = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
     if shapes and formats is not None:
         out.surface = surface_of(structure, next(iter(shapes.values())))
         out.fields = modes_writer(analysis, out) if formats else None
     return out
+
+
+def remarks(analysis: ModalAnalysis, spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
+    """Return the stability of the equilibrium, and warnings of it, of the model, and of modes that grow."""
+    found = stability_of_pencil(spinning.pencil, spinning.clamped)
+    out = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(rows)]
+    out += critical(rows, spinning.speed, analysis.fixed)
+    # An instability that grows by more than those of the modes that are asked for is none of them.
+    least = 1.001 * max((row["growth"] for row in rows), default=0.0)
+    if found.stable is None or found.held_by_spin or found.growth > max(least, 0.0):
+        out.append(found.warning())
+    return found, out
 
 
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:

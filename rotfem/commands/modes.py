@@ -19,7 +19,7 @@ from rotfem.accuracy.errors import Errors, warnings_of
 from rotfem.accuracy.modes import Modes, modal_answers, modal_errors
 from rotfem.analysis.modal import ModalAnalysis, self_checks
 from rotfem.analysis.modal import participation as masses_of
-from rotfem.analysis.stability import critical_speed, stability_of_pencil
+from rotfem.analysis.stability import critical_speed
 from rotfem.commands.advice import advise, frozen_inputs
 from rotfem.commands.answers import check_of, clock_of, to_accuracy
 from rotfem.commands.mode_tables import doubtful, mode_tables
@@ -68,103 +68,89 @@ def modes(
         raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
     def compute(variant: Scene, errors: Errors | None = None, known: Modes | None = None) -> ModesResult:
-        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, hint, errors, known)
+        found = _modes(variant, Problem.of(variant, terms=terms), comm, hint, errors, known)
         found.blade_tables = blade_tables
+        if sensitivities:
+            from rotfem.analysis.sensitivity import sensitivities as derivatives
+
+            found.sensitivities = derivatives(found.analysis, found.spinning)
         if participation:
             masses, found.summary["mass"] = masses_of(found.analysis, found.spinning)
             for row, mass in zip(found.rows[len(found.rows) - len(masses) :], masses, strict=True):
                 row |= mass
         return found
 
-    with input_of(scene.file):
-        if scene.accuracy is None:
-            return compute(scene)
-        problem = Problem.of(scene, terms=terms)
-        return led_to_accuracy(scene, analysis_of(scene, problem, comm, False), speed_of(scene, problem), compute)
+    return answered(scene, compute, comm, terms)
 
 
-def speed_of(scene: Scene, problem: ProblemData) -> float:
-    """Return the speed of the modes of a scene, rad/s."""
+def final_speed(scene: Scene, problem: ProblemData) -> float:
+    """Return the speed of the modes and the response of a scene, rad/s."""
     return problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
 
 
-def led_to_accuracy(scene: Scene, analysis: ModalAnalysis, speed: float, compute: Callable[..., R]) -> R:
-    """Return what a command computes of the modes of a scene, with the setting whose modes are within its accuracy."""
-    check_of(scene, ("frequencies",), "modes and campbell")
-    answers, comm = modal_answers(scene, analysis, speed), analysis.everyone
+def answered(
+    scene: Scene, compute: Callable[..., R], comm: MPI.Comm, terms: Mapping[str, Work] | None, top: bool = False
+) -> R:
+    """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one.
 
-    def finish(found: Modes, errors: Errors) -> R:
-        setting = Setting(found.analysis.problem.theory.name, *_mesh_of(found.analysis))
-        return compute(answers.variant(setting).replace({"output.error": None}), errors, found)
-
-    return to_accuracy(answers, "frequencies", clock_of(scene, comm), comm, finish)
-
-
-def _mesh_of(analysis: ModalAnalysis) -> tuple[Any, int]:
-    """Return the numbers of elements and the degree of an analysis."""
-    problem = analysis.problem
-    return None if problem.structure.mesh_file else problem.mesh.elements, problem.mesh.degree
-
-
-def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
-    """Return what a command computes of a scene, with the setting that its accuracy leads to if it has one."""
+    Args:
+        scene: of modes.
+        compute: (scene) ↦ result; or (scene, errors, modes) of a setting that was found to be within the accuracy.
+        comm: processes.
+        terms: see `modes`.
+        top: whether the accuracy is that of the modes at the highest speed, or else at the final one.
+    """
     with input_of(scene.file):
         if scene.accuracy is None:
             return compute(scene)
-        problem = Problem.of(scene).spinning()
-        top = problem.motion.top_speed(None if scene.time is None else scene.time.end)
-        analysis = analysis_of(scene, problem, comm, False)
-        return led_to_accuracy(scene, analysis, top, lambda variant, errors, found: compute(variant))
+        check_of(scene, ("frequencies",), "modes and campbell")
+        problem = Problem.of(scene, terms=terms)
+        end = None if scene.time is None else scene.time.end
+        speed = problem.motion.top_speed(end) if top else final_speed(scene, problem)
+        answers = modal_answers(scene, analysis_of(scene, problem.spinning() if top else problem, comm, False), speed)
+
+        def finish(found: Modes, errors: Errors) -> R:
+            problem = found.analysis.problem
+            elements = None if problem.structure.mesh_file else problem.mesh.elements
+            setting = Setting(problem.theory.name, elements, problem.mesh.degree)
+            return compute(answers.variant(setting).replace({"output.error": None}), errors, found)
+
+        return to_accuracy(answers, "frequencies", clock_of(scene, comm), comm, finish)
 
 
 def _modes(
     scene: Scene,
     problem: ProblemData,
     comm: MPI.Comm,
-    sensitivities: bool,
     hint: Hint | None,
     errors: Errors | None = None,
     known: Modes | None = None,
 ) -> ModesResult:
-    started, given, began = perf_counter(), known is not None, cpu_time() - Compiling.seconds
+    started, began = perf_counter(), cpu_time() - Compiling.seconds
     analysis = analysis_of(scene, problem, comm) if known is None else known.analysis
-    speed = speed_of(scene, problem)
+    speed = final_speed(scene, problem)
     hints = hints_of(analysis, scene, hint, speed)
-    modes = None if known is None else known.spinning
+    spinning = analysis.at(speed, scene.modes.count) if known is None else known.spinning
     # matrices last where other modes are computed after these
-    found = mode_tables(analysis, speed, scene.modes.count, formats=scene.output.fields, found=modes)
+    found = mode_tables(analysis, spinning, scene.modes.count, formats=scene.output.fields)
     seconds = cpu_time() - Compiling.seconds - began
     check_rows(found.rows)
-    spinning = found.spinning
-    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    warnings = [*frozen_inputs(problem), *analysis.notes, *found.warnings]
-    # An instability that grows by more than those of the modes that are asked for is none of them.
-    least = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
-    if stability.stable is None or stability.held_by_spin or stability.growth > max(least, 0.0):
-        warnings.append(stability.warning())
+    warnings = [*frozen_inputs(problem), *found.summary["warnings"]]
     if scene.output.error and errors is None:
-        errors = modal_errors(scene, analysis, spinning, seconds=seconds)
+        errors = modal_errors(scene, analysis, found.spinning, seconds=seconds)
     if errors is not None:
-        rigid = len(found.rows) - len(spinning.pairs.values)
+        rigid = len(found.rows) - len(found.spinning.pairs.values)
         for row, error in zip(found.rows, [*[0.0] * rigid, *errors.each], strict=False):
             row["mesh_error"] = error
-        if not given:
+        if known is None:
             warnings += warnings_of(errors, Setting.of(scene, moving=False), scene)
-    warnings += doubtful(found.rows)
-    found.summary = {
+        found.summary |= {"error": errors.summary(), "settings": errors.rows}
+    found.summary |= {
         **modal_summary("modes", analysis, scene, started),
-        "speed": speed,
-        "stability": stability.summary(),
-        **({} if errors is None else {"error": errors.summary(), "settings": errors.rows}),
-        **{name: found.summary[name] for name in ("modes", "shapes")},
-        "checks": self_checks(spinning),
-        "warnings": warnings,
+        "checks": self_checks(found.spinning),
+        "warnings": warnings + doubtful(found.rows),
         "advice": hints,
     }
-    if sensitivities:
-        from rotfem.analysis.sensitivity import sensitivities as derivatives
-
-        found.sensitivities = derivatives(analysis, spinning)
     return found
 
 

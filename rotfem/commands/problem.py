@@ -271,7 +271,7 @@ class Problem(ProblemData):
         problem = self.spinning() if speed != 0.0 else self
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
-        return mode_tables(analysis, speed, count)
+        return mode_tables(analysis, analysis.at(speed, count), count)
 
     def _speed(self, speed: float | str | None) -> float:
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")
@@ -340,10 +340,7 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
 
 
 def cell_of(time: Time | None) -> float | None:
-    """Return the length of time (s) in which differences of a user's function have one step; None without [time].
-
-    It is that of 16 steps, or a 64th of a history of adaptive steps.
-    """
+    """Return the time (s) in which differences have one step: of 16 steps, or a 64th of a history."""
     if time is None:
         return None
     return 16 * time.step if time.step else time.end / 64

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -39,7 +39,6 @@ class Log:
     Attributes:
         started, began: `perf_counter()` then, and CPU time without compilation, s.
         steps: number of the last step.
-        parts: steps that were taken, parts of steps counted each.
         elapsed, cpu: time and CPU time that it had taken before it went on from a checkpoint, s.
         warnings, advice: texts.
         resumed: time (s) and number of ranks of every checkpoint that it went on from.
@@ -48,7 +47,6 @@ class Log:
     started: float = field(default_factory=perf_counter)
     began: float = field(default_factory=computing)
     steps: int = 0
-    parts: int = 0
     elapsed: float = 0.0
     cpu: float = 0.0
     warnings: list[str] = field(default_factory=list)
@@ -253,11 +251,7 @@ class Recorder:
         self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:
-        """Add a row for a state."""
-        self.add(self.row(state), state)
-
-    def row(self, state: State) -> list[float]:
-        """Return the row of a state; stations and plates keep what they have of it."""
+        """Add a row for a state; stations and plates keep what they have of it."""
         system, t = self.system, state.t
         system.set_time(t)
         write_state(system, state)
@@ -271,12 +265,9 @@ class Recorder:
         row += system.outputs().values()
         if self.stations is not None:
             self.stations(t)
-        return row if self.resultants is None else [*row, self.resultants(t)]
-
-    def add(self, row: Sequence[float], state: State) -> None:
-        """Add a row, and keep the state that it is of."""
+        row += [] if self.resultants is None else [self.resultants(t)]
         if not math.isfinite(sum(row)):
-            check_finite(zip(self.history.columns, row, strict=True), row[0])
+            check_finite(zip(self.history.columns, row, strict=True), t)
         self.history.append(row)
         self._last = state
         if self.snapshots is not None:

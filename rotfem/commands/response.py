@@ -27,10 +27,9 @@ from rotfem.analysis.frequency_response import (
     tip_output,
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.advice import frozen_in_frame
-from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of
+from rotfem.commands.mode_tables import doubtful, mode_rows, remarks
+from rotfem.commands.modes import analysis_of, final_speed
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
@@ -84,8 +83,7 @@ def response(
             raise InputError("structure.supports", None, why)
         problem = problem.replace(loads=swept_loads(scene, problem.motion))
         analysis = analysis_of(scene, problem, comm)
-        speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
-        spinning = analysis.at(speed, scene.modes.count)
+        spinning = analysis.at(final_speed(scene, problem), scene.modes.count)
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
         asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
 
@@ -221,15 +219,8 @@ def result_of(
             row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
         rows.append(row | {"peak": int(peak)})
     modes = mode_rows(analysis, spinning)
-    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    warnings = [
-        *frozen_in_frame(analysis.problem),
-        *analysis.notes,
-        *advice(analysis, spinning.speed),
-        *instabilities(modes),
-        *doubtful(modes),
-    ]
-    warnings += [stability.warning()] if not stability.stable else []
+    stability, said = remarks(analysis, spinning, modes)
+    warnings = [*frozen_in_frame(analysis.problem), *said, *doubtful(modes)]
     warnings += [no_damping(modes, undamped)] if undamped else []
     if scene.accuracy is not None:
         warnings.append(

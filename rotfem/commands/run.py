@@ -25,13 +25,12 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
 from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, to_accuracy, with_error
-from rotfem.commands.explain import needed_model
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder
-from rotfem.commands.run_store import Memory, RunStore, interval
+from rotfem.commands.run_store import RunStore, interval
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, computing, silent
@@ -113,7 +112,7 @@ class Simulation:
     @property
     def steps(self) -> int:
         """Number of steps that were taken, parts of steps counted each."""
-        return self.log.parts
+        return 0 if self.march is None else self.march.parts
 
     @property
     def stable(self) -> bool | None:
@@ -184,7 +183,7 @@ class Simulation:
         """March through the history."""
         scheme = scheme_of(time)
         march = self.march = March(self.system, scheme, Steps.of(time), self.iteration, start.q, start.v)
-        march.reached = self.store.start(self._memory())
+        march.reached = self.store.start(self)
         times = self.times
         if times is None and time.output_step is not None:
             times = multiples(time.output_step, time.end)
@@ -192,16 +191,12 @@ class Simulation:
             begin = 0.0 if march.reached is None else march.reached.t
             self.rows = RowTimes(times, scheme.order, self.system.comm, begin)
             march.observers.append(self.rows)
-        march.observers.append(self._leg)
         with self.store.interrupts:
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
                 self._stepped(state, time)
 
     # --- what sees them ---------------------------------------------------------------------------------------------
-
-    def _leg(self, old: State, new: State) -> None:
-        self.log.parts += 1
 
     def _stepped(self, state: State, time: Time) -> None:
         """Show a state of the march to all that observe it."""
@@ -229,11 +224,6 @@ class Simulation:
     def _recorded(self, state: State) -> None:
         self.monitor.row(state)
         self.record(state)
-
-    def _memory(self) -> Memory:
-        """Return what a checkpoint holds."""
-        assert self.scene.time is not None
-        return Memory(self.scene.time, self.system, self.march, self.record, self.monitor, self.log)
 
     # --- the result -------------------------------------------------------------------------------------------------
 
@@ -390,6 +380,8 @@ def simulate(
             check_of(scene, ("tip", ROOT_MOMENT), "run")
             answers.times, more = rows_of(scene), dict[str, Any]()
             if scene.model.effects == "needed" and output_of(scene) == "tip":
+                from rotfem.commands.explain import needed_model  # other runs do without
+
                 found = needed_model(scene, terms or {}, comm)
                 answers.scene = scene.replace({"model.effects": list(found.effects)})
                 answers.neglected = {"effects": found.change}

@@ -17,12 +17,12 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import reduce
 from importlib import import_module
 from pathlib import Path
 from time import monotonic, perf_counter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -36,7 +36,7 @@ from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.listeners import computing
 from rotfem.results.files import write_whole
 from rotfem.results.result_set import CHECKPOINT, ResultFolder
-from rotfem.scene import Scene, Time
+from rotfem.scene import Scene
 from rotfem.version import __version__
 
 Tree = dict[str, Any]
@@ -49,71 +49,66 @@ ARRAY, CLASS = "#array", "#class"
 
 #: What a run remembers besides its state: the attributes of its parts that a checkpoint holds.
 REMEMBERED = {
-    "log": ("steps", "parts", "warnings", "resumed"),
+    "log": ("steps", "warnings", "resumed"),
     "monitor": ("since", "stability", "farthest"),
     "record.snapshots": ("kept", "_every", "_count"),
     "record.stations": ("kept", "seen"),
     "record.resultants": ("last", "largest"),
-    "march": ("substeps", "rejected"),
+    "march": ("parts", "substeps", "rejected"),
     "march.last": ("long", "confirmed"),
     "march.newton": ("iterations", "roundoff", "_kappa", "_longest"),
 }
 
 
-@dataclass
-class Memory:
-    """The parts of a run that a checkpoint is of; without a march nothing can be kept."""
+class Run(Protocol):
+    """What a checkpoint is of; without a march nothing can be kept."""
 
-    time: Time
+    scene: Scene
     system: System
     march: March | None
     record: Recorder
     monitor: Monitor
     log: Log
 
-    def parts(self) -> dict[str, Any]:
-        """Return the parts of `REMEMBERED` that there are, by name."""
-        found = {name: reduce(lambda x, key: x and getattr(x, key), name.split("."), self) for name in REMEMBERED}
-        return {name: part for name, part in found.items() if part is not None}
 
-    def taken(self, state: State) -> Tree:
-        """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
-        own = {
-            "positions": self.system.V.tabulate_dof_coordinates(),
-            "state": state,
-            "parts": {
-                name: {key: getattr(part, key) for key in REMEMBERED[name]} for name, part in self.parts().items()
-            },
-        }
-        return {
-            "t": state.t,
-            "elapsed": self.log.elapsed + perf_counter() - self.log.started,
-            "cpu": self.log.cpu + computing() - self.log.began,
-            "rows": np.array(self.record.history.rows),
-            "processes": self.system.comm.gather(own),
-        }
+def parts_of(run: Run) -> dict[str, Any]:
+    """Return the parts of `REMEMBERED` that there are, by name."""
+    found = {name: reduce(lambda x, key: x and getattr(x, key), name.split("."), run) for name in REMEMBERED}
+    return {name: part for name, part in found.items() if part is not None}
 
-    def put_back(self, path: Path, tree: Tree) -> State:
-        """Make the run know what a checkpoint says; return the state to go on from."""
-        comm, here, ranks = self.system.comm, self.system.V.tabulate_dof_coordinates(), len(tree["processes"])
-        if ranks != comm.size:
-            why = f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many"
-            raise refused(path, why)
-        own = tree["processes"][comm.rank]
-        there, near = own["positions"], 1e-9 * float(np.max(np.ptp(here, axis=0)))
-        same = there.shape == here.shape and bool(np.max(np.abs(there - here)) <= near)
-        if not comm.allreduce(same, MPI.LAND):
-            raise refused(path, "is of another mesh")
-        for name, part in self.parts().items():
-            vars(part).update(own["parts"][name])
-        for row in tree["rows"]:
-            self.record.history.append(row)
-        self.log.elapsed, self.log.cpu = tree["elapsed"], tree["cpu"]
-        state: State = own["state"]
-        self.log.resumed.append({"time": state.t, "ranks": comm.size})
-        self.system.count_rotations_from(state.reference)
-        self.system.set_time(state.t)
-        return state
+
+def taken(run: Run, state: State) -> Tree:
+    """Return the content of a checkpoint at a state, on all ranks together; complete on rank 0."""
+    parts = {name: {key: getattr(part, key) for key in REMEMBERED[name]} for name, part in parts_of(run).items()}
+    own = {"positions": run.system.V.tabulate_dof_coordinates(), "state": state, "parts": parts}
+    return {
+        "t": state.t,
+        "elapsed": run.log.elapsed + perf_counter() - run.log.started,
+        "cpu": run.log.cpu + computing() - run.log.began,
+        "rows": np.array(run.record.history.rows),
+        "processes": run.system.comm.gather(own),
+    }
+
+
+def put_back(run: Run, path: Path, tree: Tree) -> State:
+    """Make a run know what a checkpoint says; return the state to go on from."""
+    comm, here, ranks = run.system.comm, run.system.V.tabulate_dof_coordinates(), len(tree["processes"])
+    if ranks != comm.size:
+        raise refused(path, f"is of a mesh that {ranks} processes share, and here are {comm.size}: go on with as many")
+    own = tree["processes"][comm.rank]
+    there, near = own["positions"], 1e-9 * float(np.max(np.ptp(here, axis=0)))
+    if not comm.allreduce(there.shape == here.shape and bool(np.max(np.abs(there - here)) <= near), MPI.LAND):
+        raise refused(path, "is of another mesh")
+    for name, part in parts_of(run).items():
+        vars(part).update(own["parts"][name])
+    for row in tree["rows"]:
+        run.record.history.append(row)
+    run.log.elapsed, run.log.cpu = tree["elapsed"], tree["cpu"]
+    state: State = own["state"]
+    run.log.resumed.append({"time": state.t, "ranks": comm.size})
+    run.system.count_rotations_from(state.reference)
+    run.system.set_time(state.t)
+    return state
 
 
 # --- the file ---------------------------------------------------------------------------------------------------------
@@ -249,7 +244,7 @@ class RunStore:
         resume: bool = False,
     ):
         self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
-        self._run: Memory | None = None
+        self._run: Run | None = None
         self._tree: Tree | None = None
         self._identity: Tree = {}
         self.interrupts = Interrupts(comm.size == 1)
@@ -283,7 +278,7 @@ class RunStore:
             self._tree = self.folder.first_does(read)
             self.every = self.every or self._tree["every"]
 
-    def start(self, run: Memory) -> State | None:
+    def start(self, run: Run) -> State | None:
         """Begin the results of a run; return the state of the checkpoint that it goes on from, None without."""
         self._run = run
         folder, tree, state = self.folder, self._tree, None
@@ -291,7 +286,7 @@ class RunStore:
             return None
         if tree is not None:
             with checkpoint_of(folder.path / CHECKPOINT):
-                state = run.put_back(folder.path / CHECKPOINT, tree)
+                state = put_back(run, folder.path / CHECKPOINT, tree)
         self._tree = None  # of this run alone, not of a finer one after it
         folder.begin((CHECKPOINT,) if tree is not None else ())
         folder.grow("history.csv", run.record.history)
@@ -302,17 +297,18 @@ class RunStore:
         """Take note of the end of a step; raise `Stopped` where a signal has asked one of the ranks to end."""
         assert self._run is not None
         self._run.record.history.flush(1.0)
-        (asked, due), time = self._agreed(self._run), self._run.time
+        (asked, due), time = self._agreed(self._run), self._run.scene.time
+        assert time is not None
         left = (time.end - state.t) / (time.step or 1e-9 * time.end)  # steps at least; of adaptive ones if there is one
         # The last state that a run with a later end would have met, too, is kept; none after it.
         if left >= 1 - 1e-6 and (asked or due or (time.step is not None and left < 2 - 1e-6)):
             self._save(state)
         if asked:
             if self.folder is not None:  # at once: mpirun gives its processes a quarter of a second to end
-                self.folder.first_does(self.folder.stop)
+                self.folder.close(KeyboardInterrupt())
             raise Stopped
 
-    def _agreed(self, run: Memory) -> tuple[bool, bool]:
+    def _agreed(self, run: Run) -> tuple[bool, bool]:
         """Return whether a signal has come to one of the ranks, and whether a checkpoint is due, the same on all.
 
         Ranks that share a mesh talk to each other after every step, others, whose steps are quick, seldom.
@@ -332,6 +328,6 @@ class RunStore:
         folder = self.folder
         if folder is None or self._run is None or self.every is None:
             return
-        tree = self._run.taken(state) | {"identity": self._identity, "every": self.every}
+        tree = taken(self._run, state) | {"identity": self._identity, "every": self.every}
         folder.first_does(lambda: write_checkpoint(folder.path / CHECKPOINT, tree))
         self._written = monotonic()

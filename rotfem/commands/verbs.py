@@ -265,6 +265,12 @@ def campbell(
     only: Annotated[
         bool, typer.Option("--only", help="solve no other speeds; critical speeds are interpolated between them")
     ] = False,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--map", metavar="KEY=RANGE", help="critical speeds over structure.supports.*.stiffness=1e6:1e9:20"
+        ),
+    ] = None,
 ) -> None:
     """Compute the Campbell diagram and critical speeds of SCENE.
 
@@ -280,6 +286,7 @@ def campbell(
         rated=None if rated is None else listed("--rated", rated, float, 1)[0],
         operating=None if operating is None else listed("--operating", operating.replace(":", ","), float, 2),
         only=only,
+        map=over,
         folder=session.results.path,
         progress=session.bar,
         hint=session.hint,

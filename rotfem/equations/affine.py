@@ -6,7 +6,7 @@ effects, so that effects can be left out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import theories
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver, combine, set_diagonal
+from rotfem.numerics.linear import combine, set_diagonal
 
 Array = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class AffineSystem(System):
 
     def __init__(self, *arguments: Any):
         super().__init__(*arguments)
-        if self._by_mode is not None:  # to those who project the pieces it is one like others
+        if self._by_mode is not None:  # to the rows of the clamp it is one like others
             taken_up = -self._by_mode.B @ self._by_mode.along(self.root.carried())  # by the hub, see `hub_damping`
             self.pieces = [*self.pieces, Piece("C", (), self._by_mode, frozenset((EFFECT, "")), taken_up)]
             self._factors = self._factor_indices()
@@ -124,15 +124,6 @@ class AffineSystem(System):
             if value != 0.0:
                 self._load.axpy(value, operator)
 
-    def coefficients(self, motion: Motion) -> Array:
-        """Return the factor of every piece at t = 0 of another motion, shape (n,), without setting it."""
-        values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
-        return self._products(np.concatenate([UNIT_FACTOR, *(np.ravel(values[name]) for name in self._constants)]))
-
-    def factors(self, values: Mapping[str, Array], n: int) -> Array:
-        """Return the factor of every piece at n times, shape (n, pieces), from the values (n, size) of constants."""
-        return self._products(np.hstack([np.ones((n, 1)), *(values[name] for name in self._constants)]).T)
-
     def _products(self, values: Array) -> Array:
         """Return the product that multiplies each piece, from 1 and the values of all constants in their order."""
         return np.asarray((values[self._factors[:, 0]] * values[self._factors[:, 1]]).T * self._weights)
@@ -212,16 +203,6 @@ class AffineSystem(System):
         return out
 
     # --- the parts of the stiffness ------------------------------------------------------------------------------
-
-    @property
-    def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1."""
-        return self._decomposed.material
-
-    @property
-    def material_solver(self) -> DirectSolver:
-        """Solver of the `material`."""
-        return self._decomposed.material_solver
 
     def matrices_at_rest(self) -> tuple[Any, Any]:
         """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""

@@ -38,32 +38,22 @@ class Torque:
     __repr__ = short_fields
 
     @cached_property
-    def _pulses(self) -> Rows:
-        """Pulses; times that differ by a rounding only, 1e-14 of themselves, are one and the same."""
-        last = -np.inf
-        same: dict[float, float] = {}
-        for t in sorted({t for start, end, _ in self.pulses for t in (start, end)}):
-            last = last if t - last <= 1e-14 * abs(t) else t
-            same[t] = last
-        return tuple((same[start], same[end], torque) for start, end, torque in self.pulses)
-
-    @cached_property
     def _line(self) -> tuple[Array, Array]:
-        """Times, and torques that are linear between them; of pulses two at a time, before and after a jump."""
+        """Times, and torques that are linear between them; of pulses two at a time, before and after a jump.
+
+        Times of pulses that differ by a rounding only, 1e-14 of themselves, are one and the same.
+        """
         if self.table is not None:
             t, M = np.array(self.table).T
             return t, M
-        t = np.array(self.jumps)
+        t = np.sort([t for start, end, _ in self.pulses for t in (start, end)])
+        t = t[np.diff(t, prepend=-np.inf) > 1e-14 * np.abs(t)]
         change = np.zeros(len(t))
-        for start, end, torque in self._pulses:
-            change[np.searchsorted(t, start)] += torque
-            change[np.searchsorted(t, end)] -= torque
+        for start, end, torque in self.pulses:
+            first, last = np.searchsorted(t, [start - 1e-14 * abs(start), end - 1e-14 * abs(end)])
+            change[first] += torque
+            change[last] -= torque
         return np.repeat(t, 2), np.repeat(np.concatenate([[0.0], np.cumsum(change)]), 2)[1:-1]
-
-    @cached_property
-    def jumps(self) -> tuple[float, ...]:
-        """Times (s) of discontinuity."""
-        return tuple(sorted({t for start, end, _ in self._pulses for t in (start, end)}))
 
     @property
     def knots(self) -> Array:
@@ -88,10 +78,6 @@ class Torque:
     def slopes(self, t: float, state: Callable[[], Seen]) -> tuple[float, float]:
         """Return ∂M/∂psi and ∂M/∂psi': it does not depend on them."""
         return 0.0, 0.0
-
-    def on_rigid(self, t: Array, psi: float, speed: float) -> Array:
-        """Return M at times (n,), shape (n,)."""
-        return self.many(t)
 
     def impulse(self, start: float, end: float) -> float:
         """Return ∫ M dt from start to end (s), N·m·s."""
@@ -130,10 +116,6 @@ class ControlledTorque(Torque):
         by_angle = self.controller(t, psi + SLIGHT, speed, tip) - here
         return by_angle / SLIGHT, (self.controller(t, psi, speed + SLIGHT, tip) - here) / SLIGHT
 
-    def on_rigid(self, t: Array, psi: float, speed: float) -> Array:
-        """Return M at times (n,) with a structure that does not move in the frame, shape (n,)."""
-        return np.array([self.controller(float(s), psi, speed, defaultdict(float)) for s in t])
-
 
 @dataclass(frozen=True)
 class FreeHub:
@@ -160,11 +142,14 @@ class FreeHub:
 
     def rigid_speeds(self, times: Array, inertia: float) -> Array:
         """Return the speed (n,), rad/s, at times (n,), s, from the start on, of a rigid hub of all inertia, kg·m²."""
-        h, middle = np.diff(times), 0.5 * (times[:-1] + times[1:])
-        given = None if self.torque.controlled else self.torque.many(middle)
-        speeds, decay, psi = np.full(len(times), self.speed), self.damping / inertia, 0.0
-        for k in range(len(h)):
-            M = self.torque.on_rigid(middle[k : k + 1], psi, speeds[k])[0] if given is None else given[k]
+        h, middle, psi, k = np.diff(times), 0.5 * (times[:-1] + times[1:]), 0.0, 0
+        speeds, decay = np.full(len(times), self.speed), self.damping / inertia
+
+        def seen() -> Seen:
+            return psi, float(speeds[k]), defaultdict(float)
+
+        for k, t in enumerate(middle):
+            M = self.torque.on(float(t), seen)
             speeds[k + 1] = (speeds[k] + h[k] * M / inertia) / (1 + h[k] * decay)
             psi += h[k] * speeds[k + 1]
         return speeds

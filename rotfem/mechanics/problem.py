@@ -101,9 +101,7 @@ class Problem:
         if self.frame == "rotating":
             self._check_supports()
         if self.frame == "fixed" and not self.is_shaft:
-            why = (
-                "needs a straight spatial_beam that spins about its own axis and is the same in all directions about it"
-            )
+            why = "needs a straight, round spatial_beam that spins about its own axis"
             raise InputError("model.frame", self.frame, why)
         is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
         flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
@@ -150,10 +148,7 @@ class Problem:
         """Refuse bearings that differ by direction where the shaft does, too: periodic coefficients in any frame."""
         standing = [s for s in getattr(self.structure, "supports", ()) if s.frame != "rotating"]
         if abs(self.motion.axis[0]) == 1.0 and self.motion.is_spinning and not all(s.isotropic for s in standing):
-            why = (
-                "differ by direction, and so does the shaft: its equations have periodic coefficients in every frame, "
-                "which are not solved here; make bearings or shaft the same in all directions"
-            )
+            why = "differ by direction, and so does the shaft: periodic coefficients in every frame are not solved"
             raise InputError("structure.supports", None, why)
 
     @property
@@ -196,10 +191,7 @@ class Problem:
 
 
 def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
-    """Return the names of the unknowns that stay zero at all times of a history; empty where none is known to.
-
-    The history starts undeformed, or in balance with what acts at t = 0.
-    """
+    """Return the unknowns that stay zero in a history that starts undeformed or in balance, as far as known."""
     structure: Any = resolved(structures[problem.structure.type].discretised)
     if not _is_built_in(problem) or problem.frame == "inertial" or problem.motion.pitch is not None:
         return ()

@@ -40,7 +40,7 @@ from rotfem.numerics.linear import (
     unknown_scale,
     use_direct_solver,
 )
-from rotfem.numerics.projection import Sendable, sparse_part, summed, times
+from rotfem.numerics.projection import sparse_part, summed, times
 from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_damped, quadratic
 
 Array = npt.NDArray[Any]
@@ -170,13 +170,6 @@ def matched(values: Array, others: Array, vectors: Array) -> Array:
     return _pick(vectors, others, values).conj()
 
 
-def mirror_error(values: Array) -> float:
-    """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
-    inner = values[(np.abs(values) <= np.median(np.abs(values))) & (values != 0.0)]  # 0 mirrors itself
-    distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
-    return float(np.max(distance / np.abs(inner), initial=0.0))
-
-
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
     """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
     distance = np.abs(values[None, :] - wanted[:, None])
@@ -225,7 +218,8 @@ class Eigenpairs:
     @property
     def overdamped(self) -> Array:
         """Which of them do not vibrate but die away, shape (m,)."""
-        return np.asarray((self.values.imag == 0.0) & (self.values.real < 0.0) & (self.bounds < 1.0))
+        real = np.abs(self.values.imag) <= EQUAL_EIGENVALUES * np.abs(self.values)
+        return np.asarray(real & (self.values.real < 0.0) & (self.bounds < 1.0))
 
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
@@ -305,7 +299,7 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     return values, X, np.where(np.isfinite(errors), errors, 1.0)
 
 
-class Pencil(Sendable):
+class Pencil:
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
     Args:
@@ -337,7 +331,6 @@ class Pencil(Sendable):
         self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
-        self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X for complex columns X, or a vector, of locally owned unknowns."""
@@ -400,6 +393,7 @@ class Pencil(Sendable):
             while (over := int(np.sum(pairs.overdamped))) > self.overdamped:
                 pairs = self.solve(count + over, target)
                 self.overdamped = over
+        pairs.values[pairs.overdamped] = pairs.values.real[pairs.overdamped]
         return pairs.select(np.argsort(pairs.overdamped, kind="stable"))
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
@@ -421,7 +415,6 @@ class Pencil(Sendable):
             return self._damped(count, target)
         if self.conservative:
             left = mirrored(values, right)
-            self.spectrum_error = mirror_error(values)
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = matched(values, *self._right(M, C, K, count, target)[:2])

@@ -8,7 +8,6 @@ B Bᵀ is never written out, as it would fill a sparse matrix. Equations with A 
 
 from __future__ import annotations
 
-import copyreg
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -103,46 +102,10 @@ def spanned(comm: MPI.Comm, columns: Array) -> Array:
     return np.asarray(Q @ U[first : first + len(R), sizes > 1e-10 * sizes[0]])
 
 
-def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:
-    """Return an orthonormal basis of what columns (n, m) span, shape (n, k) with k ≤ m.
-
-    Directions whose energy is below 1e-13 of the largest are dropped: the others hold them to round-off. A larger part
-    would drop what makes the small differences between modes at two speeds.
-    """
-    energies = summed(comm, np.einsum("ij,ij->j", columns, product(columns)))
-    V: Array = columns / np.sqrt(np.maximum(energies, 1e-300))
-    for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
-        gram = summed(comm, V.T @ product(V))
-        energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = energies > 1e-13 * energies[-1]
-        V = np.asarray(V @ (turns[:, keep] / np.sqrt(energies[keep])))
-    return V
-
-
 # --- few columns ------------------------------------------------------------------------------------------------------
 
 
-def _from_rows(size: tuple[int, int], rows: tuple[Array, Array, Array]) -> Any:
-    """Return a PETSc matrix of this process alone, by the arrays of its compressed rows."""
-    return PETSc.Mat().createAIJ(size, csr=rows, comm=MPI.COMM_SELF)
-
-
-copyreg.pickle(PETSc.Mat, lambda A: (_from_rows, (A.getSize(), A.getValuesCSR())))
-
-
-class Sendable:
-    """What holds matrices of one process alone, and can be sent to another one, without what it belongs to."""
-
-    comm: MPI.Comm
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("comm", "owner")}
-
-    def __setstate__(self, known: dict[str, Any]) -> None:
-        self.__dict__ |= known | {"comm": MPI.COMM_SELF, "owner": None}
-
-
-class LowRank(Sendable):
+class LowRank:
     """B Bᵀ.
 
     Attributes:

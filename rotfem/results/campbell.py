@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, number, numbers, shown_unit
 from rotfem.results.files import json_text
 from rotfem.results.result import Array, OfTable, Rows
 
@@ -110,6 +110,11 @@ class CampbellResult(Rows):
             out[label] = {name: mine.array(name).astype(np.float64) for name in mine.numbers}
         return out
 
+    def data(self) -> dict[str, Columns]:
+        """Return the branches, and critical speeds over a key where these are asked for."""
+        rows = self.summary.get("map", {}).get("rows")
+        return super().data() | ({"critical_map": Columns.of_rows(rows)} if rows else {})
+
     def texts(self) -> dict[str, str]:
         """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
@@ -124,7 +129,9 @@ class CampbellResult(Rows):
         """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
         both = self.frame != "fixed" and "whirl" in self.rows[0]
         fixed = {"campbell_fixed.png": "results.plots_campbell:fixed_figure"}
-        return {"campbell.png": "results.plots_campbell:campbell_figure", **(fixed if both else {})}
+        over = {"critical_map.png": "results.plots_campbell:map_figure"}
+        more = (fixed if both else {}) | (over if self.summary.get("map", {}).get("rows") else {})
+        return {"campbell.png": "results.plots_campbell:campbell_figure", **more}
 
     def tables(self) -> list[ShortTable]:
         """Return the branches, with frequencies at the first and the last speed, and the critical speeds."""
@@ -151,4 +158,12 @@ class CampbellResult(Rows):
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:
             out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
+        if over := self.summary.get("map"):
+            labels = list(dict.fromkeys(row["label"] for row in over["rows"]))[:4]
+            found = {(row["value"], row["label"]): f"{units.speeds(row['speed']):.6g}" for row in over["rows"]}
+            heads = [f"{label.removesuffix(' whirl')} ({units.speed})" for label in labels]
+            values = dict.fromkeys(row["value"] for row in over["rows"])
+            rows = [(f"{value:.4g}", *(found.get((value, label), "–") for label in labels)) for value in values]
+            key = over["key"].rpartition(".")[2]
+            out.append(ShortTable((f"{key} {shown_unit(key)}".rstrip(), *heads), rows))
         return out

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, ShownUnits, label
@@ -22,6 +23,9 @@ Array = npt.NDArray[np.float64]
 
 #: Height of a name at the end of a line, inch.
 NAME_HEIGHT = 0.16
+
+#: Name at the end of a line, where it ends, and its colour.
+End = tuple[str, float, float, str]
 
 #: Width of the diagram, inch.
 WIDTH = 9.0
@@ -49,8 +53,14 @@ class Branch:
 
     @property
     def style(self) -> dict[str, Any]:
-        """Colour and dashes: waves against the spin are dashed."""
-        return {"color": f"C{(self.number - 1) % 10}", "ls": "--" if "backward" in self.name else "-"}
+        """Colour and dashes (see `style_of`)."""
+        return style_of(self.name, f"C{(self.number - 1) % 10}")
+
+
+def style_of(name: str, color: str = "C2") -> dict[str, Any]:
+    """Return colour and dashes of a line: those of forward and backward whirl; waves against the spin are dashed."""
+    whirls = {"forward whirl": "C0", "backward whirl": "C1"}
+    return {"color": whirls.get(name.partition(" ")[2], color), "ls": "--" if "backward" in name else "-"}
 
 
 def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
@@ -87,7 +97,8 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         if damped:
             there = np.isfinite(b.damping)
             panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
-    rays = [(f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
+    of_shaft = any("whirl" in b.name for b in shown)  # whose orders are 1X, 2X, …
+    rays = [(f"{k}X" if of_shaft else f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
     for _, slope in rays:
         reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
@@ -100,6 +111,12 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
+        ends = [
+            (b.name, b.speed[i], b.damping[i], b.style["color"])
+            for b in shown
+            for i in np.flatnonzero(~np.isnan(b.damping))[-1:]
+        ]
+        beside(panels[1], ends, NAME_HEIGHT / heights[1])
     name_styles(axis, shown)
     entries = axis.get_legend_handles_labels()
     letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
@@ -119,6 +136,28 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
 def fixed_figure(result: CampbellResult) -> Figure:
     """Return the diagram of a rotor as the fixed frame sees it."""
     return campbell_figure(result, fixed=True)
+
+
+def map_figure(result: CampbellResult) -> Figure:
+    """Return the undamped critical speeds over a key, as the stiffness of bearings, on logarithmic axes."""
+    units, over = ShownUnits.of(result.summary), result.summary["map"]
+    figure = Figure(figsize=(WIDTH, 5.4))
+    axis, ends = figure.add_axes((LEFT / WIDTH, 0.11, 1.0 - (LEFT + 1.7) / WIDTH, 0.8)), list[End]()
+    for name in dict.fromkeys(row["label"] for row in over["rows"]):
+        rows, style = [row for row in over["rows"] if row["label"] == name], style_of(name)
+        at, speed = [row["value"] for row in rows], units.speeds([row["speed"] for row in rows])
+        axis.loglog(at, speed, lw=1.6, **style)
+        ends.append((name, at[-1], float(speed[-1]), str(style["color"])))
+    dress(axis, label(over["key"].rpartition(".")[2]), f"undamped critical speed ({units.speed})", size=None)
+    axis.grid(visible=True, which="minor", lw=0.2, alpha=0.6)
+    axis.yaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlim(min(row["value"] for row in over["rows"]), max(row["value"] for row in over["rows"]))
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_ylim(axis.get_ylim())
+    beside(axis, ends, NAME_HEIGHT / (0.8 * 5.4))
+    figure.suptitle(f"{result.title}, critical speeds", fontsize=11)
+    return figure
 
 
 def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
@@ -226,15 +265,20 @@ def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]]
     text: dict[str, Any] = {"annotation_clip": False, "fontsize": 8}
     ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
     ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
-    places = spread([y for _, _, y, _ in ends], NAME_HEIGHT / height * top, (0.0, top))
-    for (name, x, y, color), place in zip(ends, places, strict=True):
-        line = {"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0}
-        beside: dict[str, Any] = {"xytext": (1.02, place), "textcoords": axis.get_yaxis_transform(), "va": "center"}
-        axis.annotate(name, (x, y), color=color, arrowprops=line, **beside, **text)
+    beside(axis, ends, NAME_HEIGHT / height)
     leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
     at = spread([x for _, x in leaving], 0.42 / (WIDTH - 3.0) * last, (0.0, last))  # a name is 0.42 inch wide
     for (name, _), place in zip(leaving, at, strict=True):
         axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
+
+
+def beside(axis: Axes, ends: list[End], gap: float) -> None:
+    """Write names at the right of a panel whose limits are set, near ends of lines; gaps are in parts of its height."""
+    heights = [float(axis.transAxes.inverted().transform(axis.transData.transform((x, y)))[1]) for _, x, y, _ in ends]
+    for (name, x, y, color), place in zip(ends, spread(heights, gap, (0.0, 1.0)), strict=True):
+        line = {"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0, "relpos": (0.0, 0.5)}
+        at: dict[str, Any] = {"xytext": (1.02, place), "textcoords": "axes fraction", "va": "center", "fontsize": 8}
+        axis.annotate(name, (x, y), color=color, arrowprops=line, annotation_clip=False, **at)
 
 
 def spread(values: list[float], gap: float, limits: tuple[float, float]) -> list[float]:

@@ -76,10 +76,12 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
             if self._growing is not None:
                 self._growing.flush()
             kind = "" if isinstance(error, ComputationError | InputError | OutputError) else f"{type(error).__name__}: "
-            failure = {"what": " ".join(f"{kind}{error}".split()), "time": None, "advice": ""}
-            status = "interrupted" if isinstance(error, KeyboardInterrupt) else "failed"
+            found: dict[str, Any] = {"status": "interrupted"}
+            if not isinstance(error, KeyboardInterrupt):
+                what = {"what": " ".join(f"{kind}{error}".split()), "time": None, "advice": ""}
+                found = {"status": "failed", "failure": self.summary.get("failure", what)}
             with suppress(OutputError):  # as where the disk is full
-                self._summarise({"failure": failure, **self.summary, "status": status})
+                self._summarise({**self.summary, **found})
 
     def first_does(self, work: Callable[[], T]) -> T:
         """Return on every rank what rank 0 makes of some work with the files, or raise its error."""
@@ -117,12 +119,6 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         """Write a table that goes on growing on disk."""
         self.first_does(lambda: table.keep(self.path / name))
         self._growing = table
-
-    def stop(self) -> None:
-        """Put what there is on disk at once, on rank 0, and say that the computation was interrupted."""
-        if self._growing is not None:
-            self._growing.flush()
-        self._summarise({**self.summary, "status": "interrupted"})
 
     def publish(self, texts: Mapping[str, str]) -> list[Path]:
         """Write tables, file name ↦ text; return their paths."""

@@ -392,11 +392,8 @@ class SpatialBeamStructure(BeamStructure):
                 raise problem(key, None, "need a straight beam: without precone, sweep, line, and hub_offset across it")
         springs = {s.x for s in self.supports if s.holds}
         if self.root.driven and not self.root.free and len(springs) < 2:
-            raise problem(
-                "root.driven",
-                True,
-                "needs structure.supports with a stiffness at two places at least, or root.free",
-            )
+            why = "needs structure.supports with a stiffness at two places at least, or root.free"
+            raise problem("root.driven", True, why)
 
 
 def same_about_axis(A: Array) -> bool:

@@ -45,7 +45,7 @@ def read_text(path: Path) -> str:
         raise Unreadable(f"cannot be read: byte {error.start} is not UTF-8 text") from None
 
 
-_KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
+_KEY = re.compile(r"[A-Za-z0-9_-]+(\.([A-Za-z0-9_-]+|\*))*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -60,10 +60,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_override(file: str, override: str) -> tuple[str, Any]:
-    """Return key and value of an override such as `model.theory=linear`.
-
-    The value is read as TOML where that is possible and is a string otherwise.
-    """
+    """Return key and value of an override such as `model.theory=linear`; the value is TOML, or else a string."""
     key, equals, text = (part.strip() for part in override.partition("="))
     if not equals or not text or not _KEY.fullmatch(key):
         raise SceneError(file, allowed=f"override {show(override)} must have the form table.key=value")
@@ -78,8 +75,8 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 def set_keys(file: str, data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     """Return a copy of nested tables with dotted keys set, one after the other, or removed if the value is None.
 
-    Missing tables on the way are created; a number names an entry of a list, from 0. Raise a SceneError of the file
-    where a part of a path is neither a table nor an entry of a list.
+    Missing tables on the way are created; a number names an entry of a list, from 0, and * all of them. Raise a
+    SceneError of the file where a part of a path is neither a table nor an entry of a list.
     """
     for key, value in changes:
         parts = key.split(".")
@@ -92,6 +89,8 @@ def _set(file: str, given: Any, key: str, parts: Sequence[str], depth: int, valu
     if depth == len(parts):
         return value
     part: Any = parts[depth]
+    if isinstance(given, list | tuple) and part == "*":
+        return [_set(file, entry, key, parts, depth + 1, value) for entry in given]
     if isinstance(given, list | tuple) and part.isdigit() and int(part) < len(given):
         out: Any = list(given)
         out[int(part)] = _set(file, out[int(part)], key, parts, depth + 1, value)
@@ -127,13 +126,9 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not isinstance(value, str | Path) or not str(value):
         raise problem("", value, "must be the path of a file")
     directory = Path((info.context or {}).get("directory", "."))
-    try:
-        path = (directory / value).resolve()
-        found, there = path.is_file(), path.exists()
-    except (OSError, ValueError) as error:
-        raise problem("", str(value), f"must be the path of a file: {error}") from None
-    if not found:
-        what = "is no regular file" if there else "file not found"
+    path = (directory / value).resolve()
+    if not path.is_file():
+        what = "is no regular file" if path.exists() else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
     READ.append(path)
     return path

@@ -370,9 +370,7 @@ def check_loads(structure: Any, motion: Any, loads: LoadsTable) -> None:
         check_place(f"loads.at.{i}.x", structure, point.x)
     for i, mass in enumerate(loads.unbalance):
         if not getattr(structure, "is_straight", False) or any(motion.axis[1:]):
-            raise problem(
-                f"loads.unbalance.{i}", None, "needs a shaft: a straight spatial_beam that spins about its axis"
-            )
+            raise problem(f"loads.unbalance.{i}", None, "needs a straight spatial_beam that spins about its axis")
         check_place(f"loads.unbalance.{i}.x", structure, (mass.x,))
     if loads.pressure is not None and structure.type != "plate":
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")

@@ -18,10 +18,7 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
 def as_line(rows: Matrix) -> Matrix:
-    """Return points (x, y, z) in m; refuse them unless the first is the clamp (0, 0, 0), and they follow a line.
-
-    Two equal rows are a kink.
-    """
+    """Return points (x, y, z) in m of a line from the clamp (0, 0, 0), two equal rows a kink; refuse others."""
     if len(set(rows)) < 2 or rows[0] == rows[1] or rows[-1] == rows[-2]:
         raise problem("", None, "must be points [[x, y, z], …], at least two, and no kink at an end")
     if rows[0] != (0.0, 0.0, 0.0):

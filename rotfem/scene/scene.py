@@ -207,9 +207,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
-                "step (or tolerance, or neither with accuracy). Only constant motion has a steady state to run "
-                "without it"
+                f'missing; with motion.type = "{self.motion.type}" a run is a history: give end, and step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
@@ -246,10 +244,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 
 
 def with_shown(tables: dict[str, Any], what: str, given: object) -> dict[str, Any]:
-    """Return a scene's tables with the unit of a text as output.speed or output.frequency.
-
-    They stay as they are where they have that key, or the text has no unit that it may be.
-    """
+    """Return a scene's tables with the unit of a text, if any, as output.speed or .frequency that is not given."""
     output, unit = tables.get("output", {}), unit_of(given) if isinstance(given, str) else ""
     if not isinstance(output, Mapping) or what in output or unit not in get_args(AngularUnit):
         return tables

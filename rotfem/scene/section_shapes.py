@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -69,14 +69,6 @@ class Shape:
     alternatives: tuple[tuple[str, ...], ...] = ()
     check: Callable[..., dict[str, str]] = lambda **dimensions: {}
     may_vanish: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        choices: tuple[Any, ...] = self.choices
-        for keys in choices:
-            if isinstance(keys, str) or not all(isinstance(key, str) and key.isidentifier() for key in keys):
-                raise ValueError(f"dimensions of {self.name!r} must be a tuple of names, not {keys!r}")
-            if {*keys} & {*MATERIAL_AND_SHAPE}:
-                raise ValueError(f"no dimension of {self.name!r} can be called {', '.join(MATERIAL_AND_SHAPE)}")
 
     @property
     def choices(self) -> tuple[tuple[str, ...], ...]:

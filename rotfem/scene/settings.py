@@ -205,10 +205,7 @@ def estimates_error(scheme: type) -> bool:
 
 
 def usual(given: Mapping[str, Any]) -> str:
-    """Return the name of the scheme of a [time] table that names none, by what it gives.
-
-    Fixed steps are generalised-α's; to a tolerance one of higher order needs far fewer steps.
-    """
+    """Return the scheme of a [time] table that names none: generalised-α for fixed steps, esdirk4 for a tolerance."""
     fixed = "generalised_alpha"
     of_fixed = any(key in given for key in parameters_of(registry.schemes[fixed]))
     return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
@@ -320,11 +317,6 @@ Stations = Annotated[
 ]
 
 
-def _as_fields(value: Any) -> tuple[str, ...]:
-    """Return ("xdmf",), or nothing where that is wanted; "vtx", a format of earlier versions, stands for it too."""
-    return ("xdmf",) if as_names(value, ("xdmf", "vtx"), "a format") else ()
-
-
 #: Units in which speeds and frequencies can be printed and drawn.
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
@@ -348,7 +340,7 @@ class OutputTable(SceneModel):
     stations: Stations | None = None
     every: Count = 1
     format: Literal["csv", "netcdf"] = "csv"
-    fields: Annotated[tuple[str, ...], PlainValidator(_as_fields)] = ("xdmf",)
+    fields: tuple[Literal["xdmf"], ...] = ("xdmf",)
     error: StrictBool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"

@@ -238,10 +238,7 @@ class SpatialRoot(Root):
         return {names.index(name) for name in self.free} | ({1, 2, 4, 5} if self.driven else set())
 
     def check(self, precone: float) -> None:
-        """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid.
-
-        And springs of a root that a drive leaves free.
-        """
+        """Refuse springs of a root that a drive frees, and one of two whose axes precone (rad) or pitch turns."""
         if self.released and (self.hinges or self.pitch.changes):
             why = "leaves the root free to turn, without hinges and a pitch over time; structure.supports hold it"
             raise problem("root.driven" if self.driven else "root.free", None, why)

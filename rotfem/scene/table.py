@@ -81,10 +81,7 @@ def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> t
 
 
 def in_units(value: Any, units: Sequence[str], over: Sequence[str] = ()) -> Any:
-    """Return a value with numbers in the place of texts with units, such as "12.1 rpm".
-
-    A text that is no number with a unit stays, for who wants a number, or the path of a file.
-    """
+    """Return a value with numbers in the place of texts such as "12.1 rpm"; other texts stay."""
     if isinstance(value, Mapping):
         return {key: in_units(entry, units, over) for key, entry in value.items()}
     if isinstance(value, list | tuple):

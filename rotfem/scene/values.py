@@ -120,10 +120,7 @@ def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) 
 
 
 def symmetric(size: int, definite: bool) -> AfterValidator:
-    """Return what refuses matrices, of a table too, that are not symmetric and positive definite or semidefinite.
-
-    Symmetry is to 1e-9 of the largest entry.
-    """
+    """Return what refuses matrices that are not symmetric, to round-off, and positive (semi)definite."""
 
     def fits(rows: Any) -> bool:
         if [len(row) for row in rows] != [size] * size:
@@ -163,10 +160,7 @@ def is_table(value: object) -> bool:
 
 
 def evaluate(value: Any, x: npt.ArrayLike) -> Array:
-    """Return a number, point or matrix, or a table of them over the span, at positions x (m), any shape (…).
-
-    Tables are linear between their rows, entry by entry. The shape is (…, *shape of the value).
-    """
+    """Return a number, point or matrix, or a table of them, at x (m): (…, *shape of the value)."""
     positions = np.asarray(x, dtype=np.float64)
     if not is_table(value):
         entry = np.asarray(value, dtype=np.float64)

@@ -6,11 +6,9 @@ The planar beam has q = (u_1, u_2, alpha) along a_1 and is clamped at the hub.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from basix.ufl import element
 from dolfinx import fem, mesh
@@ -159,16 +157,6 @@ class Beam(Structure):
         return f
 
     # --- values -------------------------------------------------------------------------------------------------
-
-    def nodes(self, values: npt.NDArray[Any]) -> tuple[dict[str, Array], npt.NDArray[Any]]:
-        """Return ({"x": (n,) m, increasing}, q (n, components)) at all nodes, on every rank."""
-        x, q = self.gather(values)
-        return {"x": x[self._order, 0]}, q[self._order]
-
-    @cached_property
-    def _order(self) -> npt.NDArray[np.int64]:
-        """Numbers of the nodes in their order along the beam."""
-        return np.argsort(self._points[:, 0])
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode shape (n, components) by its family and its number, one more than its nodes."""

@@ -90,8 +90,8 @@ class Wave:
         A shaft's whirl has the direction that the fixed frame sees: forward whirl above its critical speed runs against
         the spin in the rotor. A disk's wave has that in the disk.
         """
-        # A standing mode has orbits that are ellipses of an axial ratio below 1 %.
-        if abs(self.share) < 0.02 or self.number == 0 or speed == 0.0:
+        # A standing mode has orbits that are ellipses of an axial ratio below 1 %. An overdamped one does not whirl.
+        if abs(self.share) < 0.02 or self.number == 0 or speed == 0.0 or (self.fixed and omega == 0.0):
             return ""
         return "forward" if (self.seen_fixed(omega, speed) if self.shaft else self.share) > 0.0 else "backward"
 

@@ -361,11 +361,6 @@ class Plate(Structure):
 
     # --- values -----------------------------------------------------------------------------------------------------
 
-    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
-        """Return ({"x", "y": (n,) m, sorted by x, then y}, q (n, components)) at all nodes, on every rank."""
-        x, q = self.gather(values)
-        return {"x": x[self._order, 0], "y": x[self._order, 1]}, q[self._order]
-
     def ordered(self, values: Array) -> Array:
         """Return values at the nodes of this process (owned, …) as those of all in the order of `nodes`."""
         return np.asarray(np.concatenate(self.comm.allgather(values))[self._order])
@@ -400,12 +395,6 @@ class Plate(Structure):
         off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
         return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
 
-    @cached_property
-    def _order(self) -> npt.NDArray[np.int64]:
-        """The permutation that sorts all nodes by x, then y."""
-        x, cell = self._points, 1e-7 * self.length  # closer nodes share a coordinate
-        return np.asarray(np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell))))
-
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk)
@@ -422,9 +411,7 @@ class Plate(Structure):
         tilt = np.abs(q[: self.size * owned].reshape(-1, self.size)[:, 4])
         worst = self.comm.allreduce(float(tilt.max(initial=0.0)), op=MPI.MAX)
         if worst > limit:
-            raise ComputationError(
-                f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {limit}); in the theory "
-                f"{self.problem.theory.name} the director's angles are limited there, not about direction 2",
-                time,
-                f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
+            what = (
+                f"the plate has turned about direction 1 by {worst:.3g} rad; {self.problem.theory.name} ends at {limit}"
             )
+            raise ComputationError(what, time, f'a smaller load, or model.theory = "{richest().name}"')

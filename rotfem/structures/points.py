@@ -13,10 +13,7 @@ from dolfinx import geometry
 
 
 def locate(domain: Any, point: Sequence[float]) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.float64]] | None:
-    """Return the cell of a mesh that holds a point (m), on one rank, none on the others, and its reference coordinates.
-
-    None if it is not in the mesh.
-    """
+    """Return the cell that holds a point (m), on one rank, and its reference coordinates; None if none does."""
     comm, tdim = domain.comm, domain.topology.dim
     owned = domain.topology.index_map(tdim).size_local
     x, nodes = np.array([(*point, 0.0, 0.0)[:3]]), domain.geometry.x
@@ -61,10 +58,7 @@ class Points:
         self.subdomains = [(i, cells) for i, (cells, _) in enumerate(self._places.values(), start=1)] or None
 
     def measure(self, point: Sequence[float]) -> Any:
-        """Return a measure whose integrals are values at one of the points.
-
-        Its cell gets a quadrature rule of one point with the weight 1 in place of the cell's area.
-        """
+        """Return a measure whose integrals are values at one of the points: a rule of one point of weight 1."""
         place = tuple(point)
         rule = {
             "quadrature_rule": "custom",

@@ -250,9 +250,7 @@ def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
         theory = beam.problem.theory
         limited = "behind more than one hinge" if theory.exact else f"in the theory {theory.name}"
         others = "a spring or a damper at the root" if theory.exact else f'model.theory = "{richest().name}"'
-        raise ComputationError(
-            f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns "
-            f"relative to the frame; {limited} rotations are limited to one",
-            time,
-            f"a smaller load, or {others}",
+        what = (
+            f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns"
         )
+        raise ComputationError(f"{what}; {limited} rotations are limited to one", time, f"a smaller load, or {others}")

@@ -89,10 +89,7 @@ def not_negative(values: Array) -> bool:
 
 
 def positive_matrices(definite: bool) -> Valid:
-    """Return whether upper triangles (n, 21) are those of positive (semi)definite 6×6 matrices.
-
-    They are judged with ones on the diagonal of their mean, as entries have different units.
-    """
+    """Return whether upper triangles (n, 21) are those of positive (semi)definite matrices, scaled by their mean."""
     rows, columns = np.triu_indices(6)
 
     def valid(values: Array) -> bool:

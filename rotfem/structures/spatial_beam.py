@@ -509,10 +509,7 @@ class SpatialBeam(Beam):
         return theta + rotation_part(self.turns.before)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state in which some section has turned by more than a turn, where that has no reference.
-
-        In a plane a rotation vector has one component, and no limit.
-        """
+        """Refuse sections turned by more than a turn without a reference; in a plane there is no limit."""
         in_plane = len(self.active) < len(self.components) and self.problem.theory.exact
         if self.turns is None and not in_plane:
             check_sections(self, q, time)

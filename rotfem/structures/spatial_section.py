@@ -40,10 +40,7 @@ def stretch_by_twist(radius_squared: Any, twist: Any, pretwist: Any, warping: An
 
 
 def radius_of(C: Any) -> Any:
-    """Return r² (m²) of a section stiffness (6, 6), r from its shear center.
-
-    Of the moments about the tension center and the distance of both centers.
-    """
+    """Return r² (m²) of a section stiffness (6, 6) about its shear center."""
     EA = C[0][0]
     shares = [0 if isinstance(c, int) else c / EA for c in C[0]]
     bending = C[4][4] / EA - shares[4] ** 2 + C[5][5] / EA - shares[5] ** 2

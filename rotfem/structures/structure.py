@@ -17,13 +17,14 @@ from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain, Support
+from rotfem.mechanics.loads import AppliedLoad, Load, PlaceLoad, Shapes, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
-from rotfem.structures.applied_loads import Loaded
 from rotfem.structures.mode_names import ModeName, Wave
-from rotfem.structures.points import locate
+from rotfem.structures.points import Points, locate
 from rotfem.structures.reference_rotation import Turns
+from rotfem.structures.section_fields import field_values
 
 Array = npt.NDArray[np.float64]
 
@@ -41,12 +42,8 @@ def check_memory(
     needed = times * 600 * (2.8 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
-        raise InputError(
-            key,
-            value,
-            f"makes {unknowns:.3g} unknowns, which need {needed / 1e9:.3g} GB or more; there are {there / 1e9:.3g} GB: "
-            f"take fewer elements or more machines, or set ROTFEM_MEMORY in the environment to the GB that may be used",
-        )
+        why = f"makes {unknowns:.3g} unknowns, which need {needed / 1e9:.3g} GB or more; there are {there / 1e9:.3g} GB"
+        raise InputError(key, value, f"{why}: take fewer elements, or set ROTFEM_MEMORY to the GB that may be used")
 
 
 def memory() -> float:
@@ -101,7 +98,100 @@ class PointValues:
         return out
 
 
-class Structure(Loaded):
+# --- amplitudes of loads in the forms ---------------------------------------------------------------------------------
+
+# The force or moment of a load in the forms is f = Σ_k a_k s_k (`rotfem.mechanics.loads`). Amplitudes of a uniform one
+# are the components of a constant, those of one over the span the factors of shapes, whose sum is a field. A function
+# of place has its values at the nodes as amplitudes.
+
+
+class Amplitude:
+    """The amplitudes of a load: the components of a constant of the forms, or factors of shapes whose sum is a field.
+
+    Args:
+        force: in the forms, the constant, or the field, a function blocked by the components.
+        at: time (s) ↦ amplitudes.
+        dead: whether it keeps its direction in the frame of the hub.
+        dofs: amplitudes ↦ dofs of the field; None of a constant.
+
+    Attributes:
+        value: the amplitudes, the same on every process; they take effect by `update`.
+        vector: the force in the forms.
+    """
+
+    def __init__(
+        self, force: Any, at: Callable[[float], Array], dead: bool, dofs: Callable[[Array], Array] | None = None
+    ):
+        self._force, self.at, self.dead, self._dofs = force, at, dead, dofs
+        self.value: Array = force.value if dofs is None else np.zeros_like(at(0.0))
+        self.vector: Any = force if force.ufl_shape else ufl.as_vector([force])
+
+    def turned(self, value: Array, turn: Array) -> Array:
+        """Return the amplitudes of the turned vector (3, 3); of a field as they are: that is turned in `update`."""
+        n = value.size
+        return value if self._dofs is not None or n == 1 else np.asarray(turn[:n, :n] @ value)
+
+    def update(self, turn: Array | None = None) -> None:
+        """Compute a field from the amplitudes; turn vectors by a matrix (3, 3) if given."""
+        if self._dofs is None:
+            return
+        n, dofs = self._force.function_space.dofmap.bs, self._dofs(self.value)
+        if turn is not None and n > 1:
+            dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()
+        self._force.x.array[:] = dofs
+
+
+def of_shapes(structure: Structure, load: Load, n: int) -> Amplitude:
+    """Return the amplitudes of the field f(x) = Σ_k a_k s_k(x) of the shapes of a load, with n components."""
+    rows = structure.inner_rows
+    degree = structure.V.element.basix_element.degree if len(rows) else 1
+    f = fem.Function(_space(structure, "DG", degree, n))
+    cells, parts = f.function_space.dofmap.list, []
+    for shapes in (term.shapes for term in load.terms):
+
+        def at(x: Array, near: Array, shapes: Shapes = shapes) -> Array:
+            return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
+
+        values = field_values(at, rows, degree, f.function_space).reshape(cells.size, -1, n)
+        if shapes.region:
+            there = np.zeros(len(values), dtype=bool)
+            there[cells[structure.cells_of(shapes.region)].ravel()] = True
+            values[~there] = 0.0
+        parts.append(np.moveaxis(values, 1, 0).reshape(values.shape[1], -1))
+    basis: Array = np.concatenate(parts)
+    return Amplitude(f, load.at, load.kind == "dead", lambda a: np.asarray(a @ basis))
+
+
+def of_place(structure: Structure, load: PlaceLoad, n: int) -> Amplitude:
+    """Return the values at the nodes of the field through them; one amplitude, 1, where they do not change."""
+    f = fem.Function(_space(structure, "Lagrange", structure.V.element.basix_element.degree, n))
+    index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
+    points = np.concatenate(structure.comm.allgather(x[: index.size_local]))
+    nodes = index.local_to_global(np.arange(len(x), dtype=np.int32))
+    places, dead = tuple(map(structure.place, points)), load.kind == "dead"
+
+    def at_nodes(t: float) -> Array:
+        return np.ravel(first(load.on(places, t).reshape(len(places), -1), n))
+
+    def dofs(a: Array) -> Array:
+        return np.ravel(a.reshape(-1, n)[nodes])
+
+    if load.constant:
+        once = dofs(at_nodes(0.0))
+        return Amplitude(f, lambda t: np.ones(1), dead, lambda a: a[0] * once)
+    return Amplitude(f, at_nodes, dead, dofs)
+
+
+def first(values: Array, n: int) -> Array:
+    """Return the first n components (…, n); the last one if it is one alone: a moment about axis 3, or a pressure."""
+    return values[..., -1:] if n == 1 else values[..., :n]
+
+
+def _space(structure: Structure, family: str, degree: int, n: int) -> fem.FunctionSpace:
+    return fem.functionspace(structure.mesh, (family, degree, (n,) if n > 1 else ()))
+
+
+class Structure:
     """A discretised structure: blocked Lagrange functions on a mesh, clamped somewhere.
 
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
@@ -114,10 +204,14 @@ class Structure(Loaded):
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
         points: where loads or masses are at a point.
+        load_constants: name of a load ↦ its amplitude in the forms.
     """
 
     type: ClassVar[str]
     planar: ClassVar[bool] = False
+    #: Components of a force, and of a moment.
+    dimension: ClassVar[int] = 3
+    turns_in: ClassVar[int] = 3
     #: Places along it (m) of rows of tables that are no nodes.
     inner_rows: Array = np.empty(0)
     #: Names of the unknowns.
@@ -141,8 +235,13 @@ class Structure(Loaded):
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
     stiff: ClassVar[tuple[str, ...]] = ()
 
+    k: Kinematics
+    mesh: Any
+    dx: Any
     dx_elastic: Any
+    tip: Any
     root: Any
+    points: Points
     clamped: npt.NDArray[np.int32]
     tip_values: PointValues
     length: float
@@ -150,8 +249,8 @@ class Structure(Loaded):
     radius: float = 0.0
 
     def __init__(self, problem: Problem, comm: MPI.Comm):
-        super().__init__(problem)
-        self.comm, self.data = comm, problem.structure
+        self.problem, self.comm, self.data = problem, comm, problem.structure
+        self.load_constants: dict[str, Amplitude] = {}
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
         self.size = len(self.active) + len(self.extra)
@@ -214,12 +313,8 @@ class Structure(Loaded):
             return
         file = getattr(self.data, "mesh", None)
         key, value = ("structure.mesh", shown(file)) if file else ("mesh.elements", self.problem.mesh.elements)
-        raise InputError(
-            key,
-            value,
-            f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes: {idle} would have "
-            "nothing to do; start fewer, or refine it",
-        )
+        why = f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes"
+        raise InputError(key, value, f"{why}: {idle} would have nothing to do; start fewer, or refine it")
 
     def free_unknowns(self) -> int:
         """Return how many unknowns are not clamped, over all processes."""
@@ -260,10 +355,7 @@ class Structure(Loaded):
         return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.intp]:
-        """Return the local numbers of the unknowns that the clamp holds at nodes; those of all owned nodes if None.
-
-        Among the latter are further unknowns where there are none.
-        """
+        """Return the local numbers of the unknowns that the clamp holds at nodes, of all owned nodes if None."""
         held = self._numbers(nodes, self._clamped_components())
         if nodes is not None or not self.extra:
             return held
@@ -309,6 +401,70 @@ class Structure(Loaded):
         """Return all mass that is always there or that one of these effects brings, which it then names."""
         raise NotImplementedError
 
+    # --- loads --------------------------------------------------------------------------------------------------
+
+    def position(self, q: Any) -> Any:
+        """Return the axis or mid-surface r(q), frame components (m)."""
+        raise NotImplementedError
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
+        raise NotImplementedError
+
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment m (components of its amplitude) on the rotations."""
+        raise NotImplementedError
+
+    def place(self, point: Array) -> Any:
+        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
+        return float(point[0])
+
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
+        raise NotImplementedError
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction."""
+        given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
+        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
+
+    def applied(self, name: str, load: Load) -> list[AppliedLoad]:
+        """Return the work of one load."""
+        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
+        if is_moment(name):
+            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
+        f = self.amplitude(name, load, self.dimension)
+        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
+        force = self.spread(name, vector if dead else self.turned(q, vector))
+        return [AppliedLoad(name, force, self.position(q), measure, dead)]
+
+    def _measure(self, name: str) -> Any:
+        """Return what a load works on: the tip, a point, or the whole structure."""
+        if name.startswith("at."):
+            return self.points.measure(self.problem.loads.places[int(name.split(".")[1])])
+        return self.tip if name.startswith("tip") else self.dx
+
+    def spread(self, name: str, load: Any) -> Any:
+        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
+        return load
+
+    def amplitude(self, name: str, load: Load, size: int) -> Any:
+        """Return a load in the forms, its first `size` components, and remember its amplitude."""
+        if isinstance(load, PlaceLoad):
+            made = of_place(self, load, size)
+        elif load.is_uniform:
+            constant = forms.constant(self.mesh, np.zeros(size))
+            made = Amplitude(constant, lambda t: first(load.at(t), size), load.kind == "dead")
+        else:
+            made = of_shapes(self, load, size)
+        self.load_constants[name] = made
+        return made.vector
+
+    def update_loads(self, turn: Array | None = None) -> None:
+        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead loads."""
+        for amplitude in self.load_constants.values():
+            amplitude.update(turn if amplitude.dead else None)
+
     # --- constants and fields -----------------------------------------------------------------------------------
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
@@ -347,8 +503,16 @@ class Structure(Loaded):
         return x if self.comm.size == 1 else np.concatenate(self.comm.allgather(x))
 
     def nodes(self, values: npt.NDArray[Any]) -> tuple[dict[str, Array], npt.NDArray[Any]]:
-        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
-        raise NotImplementedError
+        """Return (coordinates x, of a plate y, (n,) each in m; values (n, components)) at all nodes, on every rank."""
+        x, q = self.gather(values)
+        names = "xy"[: self.mesh.geometry.dim]
+        return {name: x[self._order, i] for i, name in enumerate(names)}, q[self._order]
+
+    @cached_property
+    def _order(self) -> npt.NDArray[np.int64]:
+        """The permutation that sorts all nodes by x, then y."""
+        x, cell = self._points[:, : self.mesh.geometry.dim], 1e-9 * self.length  # closer nodes share a coordinate
+        return np.asarray(np.lexsort(np.round(x.T[::-1] / cell)))
 
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed structure are in the frame, (n, 3) in m, by their coordinates."""

@@ -54,13 +54,3 @@ def test_pairs_are_those_of_lapack(lowest: float, spin: float, monkeypatch: pyte
     np.testing.assert_allclose(np.abs(pairs.values[:5].real), np.abs(expected.real), atol=1e-8)
     assert np.max(pairs.errors[:5]) < 1e-8
     assert given.factor is not None  # serves what follows
-
-
-def test_vectors_near_by_are_a_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A start that lacks the first mode finds it all the same."""
-    monkeypatch.setattr(eigenproblem, "SMALL", 10)
-    given, _ = pencil(np.geomspace(1.0, 1e6, N), 0.02)
-    exact = given.solve(6)
-    again = Pencil(given.M, given.C, given.K)
-    again.near = exact.right[:, 1:6]
-    np.testing.assert_allclose(again.solve(4).values[:4], exact.values[:4], rtol=1e-9, atol=1e-9)

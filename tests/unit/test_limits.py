@@ -89,4 +89,4 @@ def test_values_are_shown_briefly_and_in_one_line() -> None:
         assert show(value).isprintable()
     assert printable("a\nb\tc") == "a\\nb\\tc"
     error = SceneError("a.toml", "key", 1, "no", [Fault(f"key\n{i}", None, "no") for i in range(1000)])
-    assert len(str(error).splitlines()) == 22
+    assert len(str(error).splitlines()) == 21

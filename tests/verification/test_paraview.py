@@ -28,7 +28,7 @@ def test_a_beam_that_moves(tmp_path: Path) -> None:
         **SPIN_UP,
         "structure": {**STRUCTURE, "hub_radius": 0.5},
         "time": {"end": 0.5, "step": 0.02},
-        "output": {"fields": ["vtx"], "error": False},
+        "output": {"fields": ["xdmf"], "error": False},
     }
     rotfem.run(scene, folder=tmp_path)
     result = rotfem.run(scene)

@@ -362,7 +362,6 @@ def test_symmetries_and_tangents(theory: str) -> None:
     result = rotfem.modes(scene)
     checks = result.summary["checks"]
     assert max(checks[f"asymmetry_{name}"] for name in "MCK") < 1e-12
-    assert checks["spectrum"] < 1e-8
     system, q = result.analysis.system, result.spinning.q
     direction = np.random.default_rng(1).standard_normal(q.size) * system.scale
     direction[system.clamped] = 0.0

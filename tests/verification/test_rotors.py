@@ -90,7 +90,9 @@ def test_diagram_in_the_fixed_frame() -> None:
     (draw,) = diagram.drawings().values()
     figure = draw()
     check(figure)
-    assert {b["label"] for b in diagram.summary["branches"]} <= {text.get_text() for text in figure.axes[0].texts}
+    assert {b["label"] for b in diagram.summary["branches"]} <= {
+        text.get_text() for text in figure.legends[0].get_texts()
+    }
     circles = [c for line in figure.axes[0].lines if line.get_marker() == "o" for c in line.get_xydata()]
     assert [c[0] for c in circles[:2]] == [c.speed for c in diagram.critical_speeds[:2]]
     np.testing.assert_allclose(*np.array(circles[:2]).T)  # whirl as fast as the spin
@@ -755,6 +757,29 @@ def test_threshold_of_internal_damping_is_found() -> None:
     (found,) = rotfem.campbell(scene, "0:5000:3").instabilities
     assert found.until is None
     np.testing.assert_allclose(found.speed, omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2)), rtol=1e-3)
+
+
+def test_map_of_critical_speeds_over_the_bearings() -> None:
+    """√(k_s k/(k_s + k)/(m/2)), half the disk on shaft and bearing, without the damping that the scene has: 1e-4."""
+    scene = shaft_on_bearings(1e4, 300.0, mesh={"elements": 4, "degree": 3})
+    scene["structure"]["section"] |= {"mass_per_length": 1e-3}
+    diagram = rotfem.campbell(scene, "0:100:3", map="structure.supports.*.stiffness=1e3:1e7:5")
+    rows, k_s = diagram.data()["critical_map"].values, 24.0 * EI
+    k = np.array(rows["value"])
+    np.testing.assert_allclose(np.unique(k), np.geomspace(1e3, 1e7, 5))
+    np.testing.assert_allclose(rows["speed"], np.sqrt(k_s * k / (k_s + k) / 5.0), rtol=1e-4)
+    assert sorted(set(rows["label"])) == ["1st backward whirl", "1st forward whirl"]
+    figure = diagram.plot(drawing="critical_map")
+    check(figure)
+    (axis,) = figure.axes
+    assert (axis.get_xlabel(), axis.get_xscale()) == ("stiffness of the supports (N/m)", "log")
+    assert (axis.get_ylabel(), axis.get_yscale()) == ("undamped critical speed (rad/s)", "log")
+    np.testing.assert_allclose(sorted({*axis.lines[0].get_ydata()}), sorted({*rows["speed"]})[::2], rtol=1e-6)
+    with pytest.raises(rotfem.SceneError, match="--map.*FIRST:LAST"):
+        rotfem.campbell(scene, "0:100:3", map="structure.supports.*.stiffness=1e3")
+    scene["structure"]["supports"][0]["stiffness"] = {"over_speed": [[0.0, 1e4], [50.0, 2e4]]}
+    with pytest.raises(rotfem.SceneError, match="map.*constant"):
+        rotfem.campbell(scene, "0:100:3", map={"structure.supports.1.stiffness": [1e4, 1e5]})
 
 
 def film_bearings() -> dict[str, Any]:

@@ -23,22 +23,15 @@ from rotfem.scene.values import DIGITS, Array
 
 
 def find_file(folder: Path, name: str) -> Path | None:
-    r"""Return the path of a file, from a folder, None if there is none.
-
-    Programs on Windows wrote the name: its parts may be joined by \\ and have letters of another case, if only one
-    entry of the folder has that name then.
-    """
+    """Return the path of a file from a folder, its name as Windows may have it; None if there is none."""
     path = folder
-    try:
-        for part in Path(name.replace("\\", "/")).parts:
-            here = path / part
-            if not here.exists() and path.is_dir():
-                others = [each for each in path.iterdir() if each.name.lower() == part.lower()]
-                here = others[0] if len(others) == 1 else here
-            path = here
-        return path.resolve() if name and path.is_file() else None
-    except (OSError, ValueError):
-        return None
+    for part in Path(name.replace("\\", "/")).parts:
+        here = path / part
+        if not here.exists() and path.is_dir():
+            others = [each for each in path.iterdir() if each.name.lower() == part.lower()]
+            here = others[0] if len(others) == 1 else here
+        path = here
+    return path.resolve() if name and path.is_file() else None
 
 
 class Deck:
@@ -249,10 +242,7 @@ def format_of(deck: Deck, name: Any) -> BladeFormat:
 
 
 def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
-    """Return the keys of [structure] that a blade file stands for, merged with those of the scene.
-
-    Damping and pitch are the scene's, where it has them; what else both have is refused.
-    """
+    """Return the keys of [structure] that a blade file stands for, with those that the scene may give beside."""
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
     with problems_at("section.from", shown(path)), np.errstate(all="ignore"):

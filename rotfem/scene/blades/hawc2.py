@@ -102,10 +102,7 @@ def _up_to(table: dict[str, Array], length: float) -> dict[str, Array]:
 
 
 def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array]:
-    """Return the columns (n,) of a set, [set, part], which must be given where an st file has several.
-
-    `full` says whether they are full matrices, as far as an htc file does.
-    """
+    """Return the columns (n,) of a set, [set, part]; `full`: whether they are full matrices, as an htc file says."""
     parts = _parts(deck)
     names = ", ".join(f"[{number}, {part}]" for number, part in parts)
     if wanted is None and len(parts) > 1:
