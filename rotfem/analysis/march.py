@@ -148,8 +148,13 @@ class March:
         yield from self._fixed(state) if self.steps.step is not None else self._adaptive(state)
 
     def warnings(self) -> list[str]:
-        """Return the warnings of a run about halved steps."""
-        return [f"{self.substeps} steps were halved where Newton failed"] if self.substeps else []
+        """Return the warnings of a run about functions that change within steps, and about halved steps."""
+        out = [f"{self.substeps} steps were halved where Newton failed"] if self.substeps else []
+        seen = [(signal.name, *signal.changes) for signal in self.system.signals if signal.changes is not None]
+        what = (
+            "{} changes within steps, as at t = {:.4g} s; sampled every {:.2g} s: time.breakpoints for what is shorter"
+        )
+        return [*(what.format(*of) for of in seen), *out]
 
     # --- fixed steps -------------------------------------------------------------------------------------------------
 

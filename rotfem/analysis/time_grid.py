@@ -3,7 +3,8 @@
 Knots are the instants at which a signal or its rate may jump: rows of tables, ends of pulses, jumps of functions, and
 `time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
 its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order; where all of them are
-near straight lines already, as tables of what steps resolve, by their values. Schemes of higher order,
+near straight lines already, as tables of what steps resolve, by their values. Lines of neighbouring steps with several
+knots each join. Schemes of higher order,
 and adaptive steps, take a step with few knots in intervals from one to the next; with more they use lines as well.
 """
 
@@ -31,6 +32,9 @@ RESOLVED = 1e-2
 
 #: Steps for each knot from which on straight lines in those with knots, each as dear as four, cost no third of a march.
 RARE = 12
+
+#: Samples of a function over a march, with eight at least and 128 at most in a step.
+SAMPLES = 20_000
 
 #: Smallest change, as a part of the largest value, that is searched for a jump; halvings that confirm one.
 JUMP, CONFIRMED = 1e-3, 10
@@ -65,6 +69,7 @@ def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterato
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]
+    fine = [False, *(before[1:] - after[:-1] > 1) & (not divided), False]  # of the steps, with one more at both ends
     begin, length = ends[0], step
     for i, end in enumerate(ends[1:]):
         inside: Any = knots[after[i] : before[i + 1]].tolist() if there[i] else []
@@ -73,14 +78,16 @@ def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterato
         stops = [*inside, last] if divided and len(inside) <= FEW else [last]
         if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORTEST * step:
             stops = [last]
-        lined = len(stops) <= len(inside)
+        line: Fit | None = (begin, last, 1) if len(stops) <= len(inside) else None
+        if fine[i + 1]:
+            line = (ends[i - 1] if fine[i] else begin, begin, last, ends[i + 2] if fine[i + 2] else last)
         for stop in stops:
             taken = stop - begin  # of one length to the last digit, so that the matrix stays
             if abs(taken - step) <= close:
                 length = step
             elif abs(taken - length) > close:
                 length = taken
-            yield Interval(stop, length, at_knot or stop != last, (begin, stop, 1) if lined else None, stop == last)
+            yield Interval(stop, length, at_knot or stop != last, line, stop == last)
             begin = stop
 
 
@@ -93,7 +100,7 @@ def knots_of(
     rates if these are many.
     """
     for signal in signals:
-        find_jumps(signal, times, breakpoints)
+        find_knots(signal, times, breakpoints)
     rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
     of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
     found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
@@ -114,17 +121,50 @@ def unresolved(signal: TimeSignal, times: Array) -> Array:
     return np.asarray(knots[np.isin(step, step[jumps | off])])
 
 
-def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:
-    """Add breakpoints (s) and jumps between the ends of steps (s) to the knots of a signal, where these are not known.
+def find_knots(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:
+    """Add breakpoints (s), jumps and what changes within steps to the knots of a signal, where these are not known.
 
-    By bisection: a large change over a step is followed into the half with more of it, down to neighbouring numbers. It
-    is a jump if it does not become smaller.
+    It is sampled in steps between times (s). Where the best cubic of a step is not near the samples, and no jump is the
+    reason, these become knots, and are sampled between once more.
     """
     if signal.known:
         return
     signal.known = True
+    if signal.primitive is not None:
+        find_jumps(signal, times, 0.0)
+        signal.knots = np.union1d(signal.knots, signal.primitive.knots)
+        return
+    cells, n, found, size = np.stack([times[:-1], times[1:]], axis=1), SAMPLES // len(times), list[Array](), 0.0
+    n = min(max(n, 8), 128)
+    for level in range(3):
+        x = (np.arange(n) + 0.5) / n
+        cubic = np.vander(x - 0.5, 4)
+        t = cells[:, :1] + np.diff(cells) * x
+        f = signal.values(t.ravel()).reshape(len(cells), n, -1)
+        size = max(size, float(np.abs(f).max()))
+        off = np.abs(f - cubic @ (np.linalg.pinv(cubic) @ f)).max(axis=(1, 2)) > RESOLVED * size
+        cuts = cells[off, :1] + np.diff(cells[off]) * (np.arange(n + 1) / n)
+        if level == 0:
+            find_jumps(signal, np.unique([*times, *t[off].ravel()]), size)
+            signal.knots = np.unique([*signal.knots, *breakpoints])
+            cuts = cuts[np.diff(np.searchsorted(signal.knots, cells[off])).ravel() == 0]
+            if len(cuts):
+                signal.changes = float(cuts[0, 0]), float(cuts[0, 1] - cuts[0, 0])
+        found.append(cuts.ravel())
+        cells, n = np.stack([cuts[:, :-1].ravel(), cuts[:, 1:].ravel()], axis=1), 8
+        if not 0 < len(cells) * n <= 10 * SAMPLES:
+            break
+    signal.knots = np.unique([*signal.knots, *np.concatenate(found)])
+
+
+def find_jumps(signal: TimeSignal, times: Array, size: float) -> None:
+    """Add jumps between times (s) to the knots of a signal that is known to reach a size.
+
+    By bisection: a large change between two is followed into the half with more of it, down to neighbouring numbers. It
+    is a jump if it does not become smaller.
+    """
     edges, f = np.stack([times[:-1], times[1:]]), signal.values(times)
-    values, size = np.stack([f[:-1], f[1:]]), float(np.abs(f).max())
+    values, size = np.stack([f[:-1], f[1:]]), max(size, float(np.abs(f).max()))
     change = np.linalg.norm(values[1] - values[0], axis=1)
     left, halvings = np.flatnonzero(change > JUMP * size), np.zeros(len(change), dtype=int)
     while len(left):
@@ -141,4 +181,4 @@ def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
     if len(knots) and signal.continuous:
         what = f"jumps at t = {knots[0]:.9g} s, which takes a force without bound: give a ramp or round it off"
         raise InputError(signal.name, None, what)
-    signal.knots = np.unique([*signal.knots, *knots, *breakpoints])
+    signal.knots = np.unique([*signal.knots, *knots])

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+import numpy.typing as npt
+
 from rotfem.analysis.stability import act_at_start, are_constant
 from rotfem.commands.problem import motion_of
 from rotfem.listeners import Hint
@@ -88,3 +91,18 @@ def frozen_in_frame(problem: Problem) -> list[str]:
         "motion.base_acceleration changes with time": motion.base is not None and not motion.base.constant,
     }
     return [f"{what}: taken as at t = 0" for what, there in found.items() if there]
+
+
+def beyond(problem: Problem, speeds: npt.ArrayLike, frequencies: npt.ArrayLike = ()) -> list[str]:
+    """Return warnings of supports that are constant beyond their tables, at speeds or frequencies of whirl (rad/s)."""
+    out, given = [], (np.asarray(speeds, dtype=float), np.asarray(frequencies, dtype=float))
+    for i, support in enumerate(getattr(problem.structure, "supports", ())):
+        parts = {f"supports.{i}": support, **{f"supports.{i}.housing.{j}": h for j, h in enumerate(support.housing)}}
+        for key, part in parts.items():
+            tables = {
+                name: table for name in type(part).model_fields if hasattr(table := getattr(part, name), "beyond")
+            }
+            for name, range_of in ((name, table.beyond(*given)) for name, table in tables.items()):
+                if range_of:
+                    out.append(f"structure.{key}.{name} is a table over {range_of}; beyond them it is held constant")
+    return out

@@ -53,6 +53,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         found: dict[str, Any] = {
             **summary("check", scene, comm, model.structure.mesh.comm),
             "type": structure.type,
+            "frame": "fixed" if problem.frame == "fixed" else "rotating",
             "length": model.structure.length,
             "mass": body.mass,
             "center_of_mass": center.tolist(),

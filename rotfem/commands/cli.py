@@ -16,7 +16,8 @@ from rotfem.commands.verbs import Debug, Json, NoPlots, Quiet, SceneFile, app, a
 def sweep(
     scene: SceneFile,
     verb: Annotated[
-        list[str], typer.Argument(metavar="-- VERB…", help="run, modes, campbell, response or check, with its options")
+        list[str],
+        typer.Argument(metavar="-- VERB…", help="run, modes, campbell, response, unbalance or check, with options"),
     ],
     overrides: Annotated[
         list[str], typer.Option("--set", metavar="KEY=A:B:N", help="values of a scene key, or KEY=A,B,…; repeatable")

@@ -26,7 +26,7 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import State
-from rotfem.commands.advice import frozen_inputs
+from rotfem.commands.advice import beyond, frozen_inputs
 from rotfem.commands.answers import in_own_setting
 from rotfem.commands.first_state import first_state
 from rotfem.commands.problem import Problem, scheme_of
@@ -291,7 +291,7 @@ class Explanation:
         (_, system, newton), count = self._of(variant), variant.modes.count
         analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
         spinning = with_plain_tangents(system, lambda: analysis.at(self.speed, count))
-        names = analysis.described(spinning).names[: count - int(spinning.rigid)]
+        names = spinning.names[: count - int(spinning.rigid)]
         lasting = [name.rest != "fast" for name in names]
         return Output(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
 
@@ -363,6 +363,7 @@ class Explanation:
         warnings = [f"{output} of {theory.name} cannot be computed: {what}" for output, what in self.failed.items()]
         if MODES in self.answers:
             warnings += [f"modes: {line}" for line in frozen_inputs(self.problem)]
+        warnings += beyond(self.problem, [self.problem.motion.top_speed(None)])
         if self.given.model.frame == "inertial":
             warnings.append("estimates are of the rotating frame, where the same physics is a sum of effects")
         rows = [change.row(theory) for change in self.changes]

@@ -20,7 +20,7 @@ from rotfem.accuracy.modes import Modes, modal_answers, modal_errors
 from rotfem.analysis.modal import ModalAnalysis, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import critical_speed
-from rotfem.commands.advice import advise, frozen_inputs
+from rotfem.commands.advice import advise, beyond, frozen_inputs
 from rotfem.commands.answers import check_of, clock_of, to_accuracy
 from rotfem.commands.mode_tables import doubtful, mode_tables
 from rotfem.commands.problem import Problem
@@ -132,10 +132,11 @@ def _modes(
     hints = hints_of(analysis, scene, hint, speed)
     spinning = analysis.at(speed, scene.modes.count) if known is None else known.spinning
     # matrices last where other modes are computed after these
-    found = mode_tables(analysis, spinning, scene.modes.count, formats=scene.output.fields)
+    found = mode_tables(spinning, scene.modes.count, formats=scene.output.fields)
     seconds = cpu_time() - Compiling.seconds - began
     check_rows(found.rows)
-    warnings = [*frozen_inputs(problem), *found.summary["warnings"]]
+    held = beyond(problem, [speed], [row["frequency"] for row in found.rows])
+    warnings = [*frozen_inputs(problem), *held, *found.summary["warnings"]]
     if scene.output.error and errors is None:
         errors = modal_errors(scene, analysis, found.spinning, seconds=seconds)
     if errors is not None:

@@ -27,7 +27,7 @@ from rotfem.analysis.frequency_response import (
     tip_output,
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.commands.advice import frozen_in_frame
+from rotfem.commands.advice import beyond, frozen_in_frame
 from rotfem.commands.mode_tables import doubtful, mode_rows, remarks
 from rotfem.commands.modes import analysis_of, final_speed
 from rotfem.commands.problem import Problem
@@ -218,9 +218,10 @@ def result_of(
         for name, answer in zip(outputs, answers, strict=True):
             row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
         rows.append(row | {"peak": int(peak)})
-    modes = mode_rows(analysis, spinning)
-    stability, said = remarks(analysis, spinning, modes)
-    warnings = [*frozen_in_frame(analysis.problem), *said, *doubtful(modes)]
+    modes = mode_rows(spinning)
+    stability, said = remarks(spinning, modes)
+    held = beyond(analysis.problem, [spinning.speed])
+    warnings = [*frozen_in_frame(analysis.problem), *held, *said, *doubtful(modes)]
     warnings += [no_damping(modes, undamped)] if undamped else []
     if scene.accuracy is not None:
         warnings.append(

@@ -23,7 +23,7 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import critical_speed, stability_of
-from rotfem.commands.advice import advise, frozen_inputs, hints_of_start
+from rotfem.commands.advice import advise, beyond, frozen_inputs, hints_of_start
 from rotfem.commands.answers import ROOT_MOMENT, check_of, clock_of, to_accuracy, with_error
 from rotfem.commands.first_state import Start, first_state
 from rotfem.commands.interrupts import together
@@ -230,6 +230,7 @@ class Simulation:
     def summarised(self, status: str, failure: ComputationError | None = None) -> RunResult:
         """Return everything computed so far with a summary of how it went."""
         history, log = self.record.history.arrays(), self.log
+        log.warnings += beyond(self.problem, history["psi_dot"])
         log.warnings += [] if self.march is None else self.march.warnings()
         if self.iteration.roundoff > 0:
             log.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")

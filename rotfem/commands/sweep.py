@@ -38,7 +38,7 @@ from rotfem.units import unit_of
 from rotfem.version import __version__, versions
 
 #: Verbs that can be swept.
-VERBS = ("run", "modes", "campbell", "response", "check")
+VERBS = ("run", "modes", "campbell", "response", "unbalance", "check")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq, minimize_scalar
 
 from rotfem.analysis.unbalance import Orbits, UnbalanceResponse
+from rotfem.commands.advice import beyond
 from rotfem.commands.campbell import parse_speeds
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
@@ -84,7 +85,7 @@ def unbalance(
             "probes": [{"x": x, "angle": angle} for x, angle in probes],
             "operating": None if operating is None else list(operating),
             "peaks": found,
-            "warnings": [*analysis.notes, *beyond(problem, asked)],
+            "warnings": [*analysis.notes, *beyond(problem, asked, asked)],
             "advice": [],
         }
         return UnbalanceResult(summary, rows, np.array([shape for shape, _, _ in answers]), response.x)
@@ -162,18 +163,6 @@ def margin(speed: float, operating: Sequence[float]) -> float:
     """Return the distance of a speed from a range in parts of the nearer end of it; 0 within it."""
     low, high = operating
     return (low - speed) / low if speed < low else (speed - high) / high if speed > high else 0.0
-
-
-def beyond(problem: Problem, speeds: Sequence[float]) -> list[str]:
-    """Return warnings of coefficients of supports that are held constant outside of their tables."""
-    out = []
-    for i, support in enumerate(problem.structure.supports):
-        for name in ("stiffness", "damping", "tilt_stiffness", "tilt_damping"):
-            table = getattr(support, name)
-            of = [table.beyond(s) for s in (speeds[0], speeds[-1])] if hasattr(table, "beyond") else []
-            if any(of):
-                out.append(f"structure.supports.{i}.{name} is a table {max(of)}; beyond them it is held constant")
-    return out
 
 
 def probe_of(text: str) -> tuple[float, float]:

@@ -205,12 +205,14 @@ class AffineSystem(System):
     # --- the parts of the stiffness ------------------------------------------------------------------------------
 
     def matrices_at_rest(self) -> tuple[Any, Any]:
-        """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
-        out = []
+        """Return (M, K) of the undeformed structure at rest on its supports (see `System`)."""
+        out, still = [], {name: of(0.0) for name, of in self.model.frame.of_supports.items()}
         for kind in "MK":
             A = self.A.duplicate()
-            chosen = [p.operator for p in self.pieces if p.kind == kind and not p.key and PRESTRESS not in p.of]
-            combine(A, chosen, np.ones(len(chosen)))
+            there = [p for p in self.pieces if p.kind == kind and PRESTRESS not in p.of]
+            chosen = [p for p in there if all(name in still for name, _ in p.key)]
+            factors = [np.prod([still[name][i] for name, i in p.key]) for p in chosen]
+            combine(A, [p.operator for p in chosen], np.array(factors))
             out.append(A)
         return out[0], out[1]
 

@@ -367,7 +367,9 @@ class System(ABC):
         return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
 
     def matrices_at_rest(self) -> tuple[Any, Any]:
-        """Return (M, K) of the undeformed structure at rest without spin and loads, as `mass_damping_stiffness` does.
+        """Return (M, K) of the undeformed structure at rest on its supports, without spin and loads.
+
+        As `mass_damping_stiffness` does.
 
         To be asked for before effects are switched.
         """
@@ -375,6 +377,8 @@ class System(ABC):
         kept = [c.value.copy() for c in constants], [x.copy() for x in self._state]
         for constant in constants:
             constant.value[...] = 0.0
+        frame = self.model.frame
+        frame.set({name: of(0.0) for name, of in frame.of_supports.items()})
         self.set_state(self.zeros())
         out = self.matrix(0, 0, 1, 0.0), self.matrix(1, 0, 0, 1.0)
         for constant, value in zip(constants, kept[0], strict=True):

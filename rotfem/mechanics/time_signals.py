@@ -7,7 +7,9 @@ replaced over a step [a, b] by the polynomial with its first moments,
     f̄(t) = Σ_k (2k + 1)/h P_k(x(t)) ∫ P_k(x(s)) f(s) ds,    x(t) = (2t − a − b)/h,    h = b − a,    k = 0 … n,
 
 P_k those of Legendre: its best approximation in the sense of least squares, with the impulse of f. A straight line
-(n = 1) serves schemes of second order, a cubic others.
+(n = 1) serves schemes of second order, a cubic others. In a row of steps with several knots each the lines of second
+order join: their value where two of them meet is the mean of f over both, weighted by the hat function of the instant.
+So the sums of the scheme have its impulse and first moment, and noise of the input does not add up in them.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.polynomial.polynomial import polyval
 
+from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import Torque
 from rotfem.mechanics.loads import Load, PlaceLoad
 from rotfem.mechanics.motion import Motion
@@ -33,8 +36,9 @@ Array = npt.NDArray[np.float64]
 #: Relative distance of two times below which they are equal.
 SAME = 1e-13
 
-#: Begin and end (s) of a step, and the degree of the polynomials that replace signals in it.
-Fit = tuple[float, float, int]
+#: Begin and end (s) of a step, and the degree of the polynomials that replace signals in it; or its begin and end after
+#: the begin and before the end of its neighbours, with which lines join (its own where they do not).
+Fit = tuple[float, float, int] | tuple[float, float, float, float]
 
 #: Gauss points and weights on (0, 1): exact for polynomials of degree 7, as a cubic times one.
 POINTS, WEIGHTS = (x / 2 for x in leggauss(4))
@@ -81,6 +85,9 @@ class TimeSignal:
         known: whether all knots are known; else jumps are searched.
         continuous: whether it must not jump, as speeds and angles.
         view: how it is evaluated.
+        changes: of a function, the first time (s) at which it was seen to change within a step, and the distance of
+            samples there (s); None if it was not.
+        primitive: of the differences of a function, which are dear, that function; its knots are theirs.
     """
 
     name: str
@@ -92,7 +99,10 @@ class TimeSignal:
     known: bool = True
     continuous: bool = False
     view: View = field(default_factory=View)
-    _fit: tuple[Fit, Array] | None = None
+    changes: tuple[float, float] | None = None
+    primitive: TimeSignal | None = None
+    _fit: tuple[Any, Array] | None = None
+    _kept: dict[Any, Array] = field(default_factory=dict)
 
     @cached_property
     def _points(self) -> Array:
@@ -108,35 +118,55 @@ class TimeSignal:
             return self.many(t)
         return np.array([np.atleast_1d(self.at(float(s))) for s in t], dtype=float).reshape(len(t), -1)
 
-    def fitted(self, t: Array, begin: float, end: float, degree: int) -> Array:
-        """Return f̄ of the step between two times (s) at times (n,), shape (n, components)."""
+    def fitted(self, t: Any, *line: Any) -> Array:
+        """Return f̄ of a step (see `Fit`) at times (n,), shape (n, components); at one, shape (components,)."""
+        begin, end = line[-3:-1] if len(line) == 4 else line[:2]
         x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
-        return np.asarray(polyval(x, self._powers(begin, end, degree)), dtype=np.float64).T
+        return np.asarray(polyval(x, self._powers(line)), dtype=np.float64).T
 
-    def _powers(self, begin: float, end: float, degree: int) -> Array:
+    def _powers(self, line: Any) -> Array:
         """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
-        if self._fit is None or self._fit[0] != (begin, end, degree):
-            middle, h = 0.5 * (begin + end), end - begin
-            first, last = np.searchsorted(self._points, (begin, end), side="right")
-            inside = self._points[first:last]
-            edges = np.array([begin, *inside[inside < end], end])
-            s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
-            weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
-            moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
-            self._fit = (begin, end, degree), LEGENDRE[: degree + 1, : degree + 1] @ moments
+        if self._fit is None or self._fit[0] != line:
+            if len(line) == 4:
+                first, last = self._joint(*line[:3]), self._joint(*line[1:])
+                powers = np.array([first + last, last - first]) / 2
+            else:
+                powers = LEGENDRE[: line[2] + 1, : line[2] + 1] @ self._moments(*line)
+            self._fit = line, powers
         return self._fit[1]
 
-    def deviation(self, t: Array, begin: float, end: float, degree: int) -> Array:
+    def _joint(self, before: float, at: float, after: float) -> Array:
+        """Return the mean of f weighted by the hat function of an instant (s) between two others."""
+        sides = ((before, at, 1.0), (at, after, -1.0))
+        total = sum((b - a) * (np.array([1.0, sign]) @ self._moments(a, b, 1)) for a, b, sign in sides if b > a)
+        return np.asarray(total / (after - before))
+
+    def _moments(self, begin: float, end: float, degree: int) -> Array:
+        """Return ∫ P_k(x(s)) f(s) ds / h of a step, shape (degree + 1, components)."""
+        if (found := self._kept.get((begin, end, degree))) is not None:
+            return found
+        middle, h = 0.5 * (begin + end), end - begin
+        first, last = np.searchsorted(self._points, (begin, end), side="right")
+        inside = self._points[first:last]
+        edges = np.array([begin, *inside[inside < end], end])
+        s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
+        weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
+        moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
+        if len(self._kept) > 4:
+            self._kept.clear()
+        self._kept[begin, end, degree] = moments
+        return np.asarray(moments)
+
+    def deviation(self, t: Array, *line: Any) -> Array:
         """Return |f − f̄| at times (n,) of a step, as parts of the largest |f| there."""
         f = self.values(t * (1 - SAME))
         largest = float(np.linalg.norm(f, axis=1).max())
-        return np.asarray(np.linalg.norm(f - self.fitted(t, begin, end, degree), axis=1) / (largest or 1.0))
+        return np.asarray(np.linalg.norm(f - self.fitted(t, *line), axis=1) / (largest or 1.0))
 
     def seen(self, t: float) -> Any:
         """Return the value at a time (s), evaluated as the view says."""
         if self.view.line is not None:
-            begin, end, _ = self.view.line
-            value = np.asarray(polyval((2 * t - begin - end) / (end - begin), self._powers(*self.view.line)))
+            value = self.fitted(t, *self.view.line)
             return float(value[0]) if self._is_number else value
         return self.at(t + self.view.side * SAME * (abs(t) or SAME)) if self.view.side else self.at(t)
 
@@ -189,15 +219,19 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
             changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:
+        signal = None
         more: dict[str, Any] = {"smooth": np.array(motion.knots), "bent": np.array(motion.bent)}
         more |= {"known": motion.smooth or motion.breakpoints is not None}
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
+            more["primitive"] = signal if isinstance(f, Derivative) else None
             many = (lambda t, f=f: np.asarray(f(t))[:, None]) if motion.arrays else None
             signal = see(f"motion.{name}", f, motion.sharp, many=many, continuous=name == "speed", **more)
             changes[name] = signal.seen
     if (pitch := motion.pitch) is not None:
-        turned = dict[str, Any]()
+        turned, signal = dict[str, Any](), None
         for name, (key, f) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):
-            turned[name] = see(key, f, pitch.knots, known=pitch.known, continuous=name != "acceleration").seen
+            more = {"continuous": name != "acceleration", "primitive": signal if isinstance(f, Derivative) else None}
+            signal = see(key, f, pitch.knots, known=pitch.known, **more)
+            turned[name] = signal.seen
         changes["pitch"] = replace(pitch, **turned)
     return replace(motion, **changes)

@@ -6,6 +6,7 @@ these units too.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -118,10 +119,10 @@ def described(column: str) -> tuple[str, str]:
     if column.startswith("tip_") and column[4:].rstrip("123") in ("u", "alpha", "theta"):
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
-    if column.startswith("support_"):
-        _, number, which = column.split("_")
-        what, unit = ("force", "N") if which[0] == "f" else ("moment", "N·m")
-        return f"{what} on support {number}, {which[0]}{_SUB[which[1:]]}", unit
+    if found := re.fullmatch(r"support_(\d+)_([fm])([23])", column):
+        number, which, i = found.groups()
+        what, unit = ("force", "N") if which == "f" else ("moment", "N·m")
+        return f"{what} on support {number}, {which}{_SUB[i]}", unit
     if column.endswith("_phase"):
         return f"phase of {described(column.removesuffix('_phase'))[0]}", "rad"
     if column.startswith("shape_"):

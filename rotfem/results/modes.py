@@ -225,9 +225,10 @@ class ModesResult(Rows):
         return out
 
     def drawn(self) -> dict[str, str]:
-        """Return modes.png, the shapes of all modes."""
-        draw = "shapes_figure" if self.triangles is None else "plate_modes_figure"
-        return {"modes.png": f"results.plots:{draw}"} if self.shapes else {}
+        """Return modes.png, the shapes of all modes, of a shaft in three dimensions with their orbits."""
+        beam = "plots_shaft:whirl_figure" if self.frame == "fixed" else "plots:shapes_figure"
+        draw = beam if self.triangles is None else "plots:plate_modes_figure"
+        return {"modes.png": f"results.{draw}"} if self.shapes else {}
 
     def tables(self) -> list[ShortTable]:
         """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency.

@@ -90,10 +90,14 @@ class CheckResult(Result):
 
 
 def check_figure(result: CheckResult) -> Figure:
-    """Return the structure as seen along axes 3, 2 and 1 with its centre of mass, and properties along a beam."""
+    """Return the structure as seen along axes 3, 2 and 1 with its centre of mass, and properties along a beam.
+
+    A shaft is drawn from the side, with its steps, disks and bearings.
+    """
     from matplotlib.figure import Figure
 
     from rotfem.results.plots import dress
+    from rotfem.results.plots_shaft import draw_shaft
 
     columns = result.columns
     there = [(tuple(n for n in names if n in columns), title, log) for names, title, log in PANELS]
@@ -101,7 +105,9 @@ def check_figure(result: CheckResult) -> Figure:
     figure = Figure(figsize=(10, 4.2 + 1.2 * len(panels)), layout="constrained")
     grid = figure.add_gridspec(2 + len(panels), 4, height_ratios=[1.7, 1.7, *[1.0] * len(panels)])
     points, center = result.surface.points, result.summary["center_of_mass"]
-    for spot, i, j in ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2)):
+    if of_shaft := result.frame == "fixed":
+        draw_shaft(figure.add_subplot(grid[:2, :]), result.summary["scene"]["structure"])
+    for spot, i, j in () if of_shaft else ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2)):
         axis = figure.add_subplot(spot)
         axis.triplot(points[:, i], points[:, j], result.surface.triangles, lw=0.3, color="0.4")
         axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
@@ -122,7 +128,9 @@ def check_figure(result: CheckResult) -> Figure:
         if len(names) > 1:
             axis.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     s = result.summary
-    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m, axes of the rotating frame", fontsize=10)
+    figure.suptitle(
+        f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m, axes of the {result.frame} frame", fontsize=10
+    )
     return figure
 
 

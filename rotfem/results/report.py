@@ -259,5 +259,7 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         said = escape(f"{row['mode']}: {row['label']}, {frequency}")
         cards += f"<figure><canvas></canvas><figcaption>{said}</figcaption></figure>"
     data = {"points": np.round(surface.points, 5).tolist(), "shapes": moves, "extent": extent}
+    if result.frame == "fixed":  # orbits of one corner of some sections
+        data["orbits"] = (4 * np.unique(np.linspace(0, len(surface.points) // 4 - 1, 9).round())).astype(int).tolist()
     data |= {"lines": np.unique(np.sort(ends, axis=1), axis=0).tolist(), "middle": ((low + high) / 2).tolist()}
     return data, f'<p class="hint">Drag to turn the view.</p><div class="modes">{cards}</div>'

@@ -30,6 +30,9 @@ def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
         for c in summary["critical_speeds"]:
             found.setdefault(f"speed_{c['kind']}_{c['order']}_{c['branch']}", c["speed"])
         return found
+    if command == "unbalance":
+        peaks = enumerate(summary["peaks"], start=1)
+        return {f"{name}_peak_{i}": peak[name] for i, peak in peaks for name in ("speed", "major", "amplification")}
     if command == "response":
         peaks = summary["peaks"]
         sizes = {f"{name}_peak": peak["amplitude"] for name, peak in peaks.items()}

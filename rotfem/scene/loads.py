@@ -19,9 +19,9 @@ from rotfem.scene.values import (
     PaddedVector,
     Positive,
     Rows,
-    check_increasing,
     check_on_span,
     check_span,
+    check_times,
 )
 
 
@@ -73,7 +73,7 @@ OVER: dict[str, tuple[str, ...]] = {
     "over_span_and_time": ("x", "t"),
     "regions": (),
 }
-CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {("t",): check_increasing, ("x",): check_span}
+CHECKS: dict[tuple[str, ...], Callable[[Any], Any]] = {("t",): check_times, ("x",): check_span}
 CHECKS |= {("x", "t"): check_grid}
 
 

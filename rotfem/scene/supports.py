@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag
 
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import SceneModel, in_units, problem, unit
-from rotfem.scene.values import Array, NonNegative, Number, Positive, check_increasing
+from rotfem.scene.values import ROUND_OFF, Array, NonNegative, Number, Positive, check_increasing
 
 #: A matrix of two rows of two: yy, yz, zy, zz.
 ZERO = ((0.0, 0.0), (0.0, 0.0))
@@ -102,13 +102,16 @@ class CoefficientTable(SceneModel):
         x = place[int(self.of_frequency)]
         return np.asarray(self._splines(np.clip(x, self._splines.x[0], self._splines.x[-1]))).reshape(2, 2)
 
-    def beyond(self, speed: float) -> str:
-        """Return which of its speeds is exceeded by a speed (rad/s), "" if none is."""
-        table = self.over_speed or self.over_both
-        if table is None:
-            return ""
-        first, last = min(row[0] for row in table), max(row[0] for row in table)
-        return "" if first <= abs(speed) <= last else f"from {first:g} to {last:g} rad/s"
+    def beyond(self, speeds: Array, frequencies: Array) -> str:
+        """Return which of its range is exceeded by speeds or frequencies of whirl (rad/s); "" if none is."""
+        table = np.array(self.over_speed or self.over_frequency or self.over_both)
+        axes = [frequencies] if self.over_frequency else [speeds] if self.over_speed else [speeds, frequencies]
+        names = ["frequencies of whirl"] if self.over_frequency else ["speeds", "frequencies of whirl"]
+        for name, values, column in zip(names, axes, table.T, strict=False):
+            first, last, sizes = min(column), max(column), np.abs(values)
+            if np.any((sizes < first * (1 - ROUND_OFF)) | (sizes > last * (1 + ROUND_OFF))):
+                return f"{name} from {first:g} to {last:g} rad/s"
+        return ""
 
 
 def _coefficient(name: str) -> Any:

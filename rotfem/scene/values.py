@@ -55,6 +55,10 @@ Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 Rows = tuple[tuple[Number, ...], ...]
 
 
+#: Length of a jump in time, as a part of the largest time of its table.
+JUMP = 1e-11
+
+
 def check_increasing(rows: Any) -> Any:
     """Return rows; refuse fewer than two of them, and a first column that does not increase strictly."""
     if isinstance(rows, float):
@@ -64,6 +68,14 @@ def check_increasing(rows: Any) -> Any:
         if after == before:
             raise problem("", None, f"the first column must increase strictly; row {i}: {after:g} twice")
     return rows
+
+
+def check_times(rows: Any) -> Any:
+    """Return rows (t, …) at least JUMP of the largest |t| (s) apart: two of one t are a ramp that keeps its digits."""
+    out, width = [check_span(rows)[0]], JUMP * max(abs(rows[0][0]), abs(rows[-1][0]))
+    for t, *values in rows[1:]:
+        out.append((max(t, out[-1][0] + width), *values))
+    return tuple(out)
 
 
 def check_span(rows: Any) -> Any:
@@ -101,22 +113,18 @@ Span = Annotated[
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
 #: A number, or a taper from x = 0, in which two rows of one x are a step.
 Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start)]
-#: Rows (t, value), t (s) strictly increasing.
-TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_increasing)]
+#: Rows (t, value), t (s) increasing.
+TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_times)]
 
 
-def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:
-    """Return whether a symmetric matrix is positive definite, or semidefinite to a slack, as mass without inertias is.
-
-    It is judged with ones on its diagonal, as its entries have different units and sizes: otherwise a soft direction
-    would pass for round-off, or the reverse.
-    """
+def is_positive(matrix: Array, definite: bool = True) -> bool:
+    """Return whether a symmetric matrix, with ones on its diagonal, is positive (semi)definite."""
     diagonal = np.diag(matrix)
     if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
         return False
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.max(diagonal) or 1.0))
     least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T) * np.outer(scale, scale))[0])
-    return least > 1e-12 if definite else least >= -slack
+    return least > 1e-12 if definite else least >= -ROUND_OFF
 
 
 def symmetric(size: int, definite: bool) -> AfterValidator:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError
-from rotfem.analysis.time_grid import find_jumps
+from rotfem.analysis.time_grid import find_knots
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
 from rotfem.mechanics.differentiation import Derivative
@@ -92,9 +92,11 @@ def test_refused(pitch: Any, more: dict[str, Any], key: str) -> None:
 
 def searched(function: Any) -> None:
     """Search the angle of a pitch and its rate for jumps."""
+    signal = None
     for f in (function, Derivative(function, 1, 0.32, (0.0,))):
-        signal = TimeSignal("structure.root.pitch", f, np.empty(0), known=False, continuous=True)
-        find_jumps(signal, np.linspace(0, 2, 101))
+        more = {"known": False, "continuous": True, "primitive": signal}
+        signal = TimeSignal("structure.root.pitch", f, np.empty(0), **more)
+        find_knots(signal, np.linspace(0, 2, 101))
 
 
 @pytest.mark.parametrize(("function", "at"), [(lambda t: abs(t - 0.777), 0.777), (lambda t: 1.0 * (t > 0.5), 0.5)])

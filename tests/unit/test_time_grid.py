@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError, run
-from rotfem.analysis.time_grid import find_jumps
+from rotfem.analysis.time_grid import find_knots
 from rotfem.mechanics.time_signals import TimeSignal
 from tests.beams import STRUCTURE
 
@@ -18,7 +18,7 @@ TIMES = np.linspace(0.0, 2.0, 201)
 
 def searched(f: Any) -> TimeSignal:
     signal = TimeSignal("loads.tip_force", f, np.empty(0), known=False)
-    find_jumps(signal, TIMES)
+    find_knots(signal, TIMES)
     return signal
 
 

@@ -90,9 +90,7 @@ def test_diagram_in_the_fixed_frame() -> None:
     (draw,) = diagram.drawings().values()
     figure = draw()
     check(figure)
-    assert {b["label"] for b in diagram.summary["branches"]} <= {
-        text.get_text() for text in figure.legends[0].get_texts()
-    }
+    assert set(diagram.labels) <= {text.get_text() for text in figure.axes[0].texts}
     circles = [c for line in figure.axes[0].lines if line.get_marker() == "o" for c in line.get_xydata()]
     assert [c[0] for c in circles[:2]] == [c.speed for c in diagram.critical_speeds[:2]]
     np.testing.assert_allclose(*np.array(circles[:2]).T)  # whirl as fast as the spin
@@ -179,6 +177,16 @@ def test_damped_bearings(theory: str, speed: float) -> None:
     expected = roots[np.argmax(roots.imag)]
     for row in rows:
         np.testing.assert_allclose([row["frequency"], row["growth"]], [expected.imag, expected.real], rtol=5e-5)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_damping_by_mode_of_a_shaft_is_external(theory: str) -> None:
+    """The modes at rest on their bearings have the ratio, and a Jeffcott rotor keeps it at any speed: 1e-4."""
+    for speed in (0.0, 200.0):
+        motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+        scene = shaft_on_bearings(2e4, motion=motion, model={"theory": theory})
+        scene["structure"]["damping"] = {"modal": 0.02}
+        np.testing.assert_allclose([row["damping"] for row in rotfem.modes(scene).rows], 0.02, rtol=1e-4)
 
 
 def test_cross_coupling_makes_forward_whirl_grow() -> None:
@@ -534,6 +542,23 @@ def test_bearings_over_speed_have_the_modes_of_their_values() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
+def test_tables_say_where_they_end() -> None:
+    """Every verb has a warning of what is beyond a table, and none within it."""
+    scene = shaft_on_bearings(
+        {"over_speed": [[0.0, 1e4], [60.0, 2e4]]}, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]}
+    )
+    load = {"tip_force": {"harmonic": {"amplitude": [0.0, 1.0, 0.0], "frequency": 1e-3}}}
+    for speed, there in ((50.0, False), (70.0, True)):
+        at = scene | {"motion": {"type": "constant", "speed": speed, "axis": [1, 0, 0]}}
+        found = [rotfem.run(at), rotfem.modes(at), rotfem.unbalance(at, [10.0, speed]), rotfem.explain(at)]
+        found += [
+            rotfem.campbell(at, [10.0, speed], only=True),
+            rotfem.response(at | {"loads": load}, 1.0, 2.0, number=2),
+        ]
+        for result in found:
+            assert any("supports.0.stiffness is a table" in text for text in result.summary["warnings"]) == there
+
+
 def test_bearings_over_frequency_are_those_of_each_whirl() -> None:
     """A stiffness k + a ω²: half the disk on it is heavier, k̂(ω) = k_s (k + aω²)/(k_s + k + aω²) = m/2 ω²; 1e-4."""
     k, a, k_s, half = 2e4, 3.0, 24.0 * EI, 5.0
@@ -594,7 +619,7 @@ def test_disk_is_its_mass_and_inertias() -> None:
     )
     np.testing.assert_allclose(one, other, rtol=1e-12)
     scene["structure"]["masses"] = [{"x": 0.5, "mass": 1.0, "offset": [0.0, 1e-4]}]
-    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset.*\[x, y, z\]"):
+    with pytest.raises(rotfem.SceneError, match=r"masses\.0\.offset"):
         rotfem.Scene.from_dict(scene)
 
 
@@ -637,7 +662,8 @@ def test_housings_in_series() -> None:
     of = rotfem.unbalance(scene, [speed, 61.0])
     np.testing.assert_allclose(of.at(0.5)["major"][0], abs(u[0]), rtol=1e-4)
     np.testing.assert_allclose(of.at(1.0)["f2"][0], both * abs(u[0] - u[1]), rtol=1e-4)
-    history = rotfem.run(scene | {"time": {"end": 0.01, "step": 0.001}, "motion": {**scene["motion"], "speed": speed}})
+    start = {"initial": {"mode": 1, "amplitude": 1e-4}, "time": {"end": 0.01, "step": 0.001}}
+    history = rotfem.run(scene | start | {"motion": {**scene["motion"], "speed": speed}})
     assert history.status == "done"
     assert not any("housing" in name for name in history.history)
 
@@ -819,3 +845,40 @@ def test_every_table_says_its_frame() -> None:
     for row in unequal.rows:
         both = sorted([row["frequency_fixed"], row["frequency_fixed_2"]])
         np.testing.assert_allclose(both, sorted([abs(row["frequency"] - 50.0), row["frequency"] + 50.0]))
+
+
+def test_shafts_are_drawn_as_they_are_built() -> None:
+    """A step, a bore, a disk and a support where they are; modes with orbits as wide as their shapes."""
+    scene = spinning_shaft()
+    section = {
+        "shape": "tube",
+        "E": 2e11,
+        "nu": 0.3,
+        "rho": 7800.0,
+        "inner_radius": [[0, 0], [6, 0], [6, 0.02], [10, 0.02]],
+    }
+    scene["structure"]["section"] = section | {"outer_radius": [[0, 0.05], [4, 0.05], [4, 0.08], [10, 0.08]]}
+    scene["structure"]["masses"] = [{"x": 7.0, "disk": {"outer_diameter": 1.0, "width": 0.1, "rho": 7800.0}}]
+    figure = rotfem.check(scene).plot()
+    check(figure)
+    axis = figure.axes[0]
+    lines = [np.asarray(line.get_xydata(), dtype=float) for line in axis.lines]
+    edge = lines[0]
+    for x, radius in ((3.99, 0.05), (4.01, 0.08)):
+        np.testing.assert_allclose(np.interp(x, *edge.T), radius, rtol=1e-9)
+    assert np.interp(4.01, *edge.T) == pytest.approx(0.08)
+    (disk,) = axis.patches
+    box = [disk.get_x(), disk.get_y(), disk.get_width(), disk.get_height()]
+    np.testing.assert_allclose(box, [6.95, -0.5, 0.1, 1.0], rtol=1e-9)
+    ends = [line[0].tolist() for line in lines if len(line) == 1 and line[0, 1] < 0.0]
+    assert ends == [[0.0, -0.05], [10.0, -0.08]]
+    found = rotfem.modes(scene)
+    figure = found.plot()
+    check(figure)
+    assert [a.name for a in figure.axes] == ["3d"] * 4
+    assert all(row["label"] in a.get_title() for row, a in zip(found.rows, figure.axes, strict=True))
+    (shape, *_), axes = found.shapes.values(), figure.axes[0]
+    orbits = [np.array(line.get_data_3d()) for line in axes.lines if len(line.get_data_3d()[0]) == 60]
+    widths = [np.hypot(*orbit[1:]).max() for orbit in orbits]
+    at = [np.flatnonzero(shape["x"] == orbit[0, 0])[0] for orbit in orbits]
+    np.testing.assert_allclose(widths, np.abs(shape["u2"] + 1j * shape["u2_imag"])[at], rtol=1e-2, atol=1e-6)
