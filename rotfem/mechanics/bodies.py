@@ -200,10 +200,7 @@ class Kinematics:
 
     @property
     def functions(self) -> tuple[Any, Any, Any, Any]:
-        """The coefficients q, v, a and the test function of the space of the unknowns.
-
-        Themselves, unless components are inactive, which then are zeros in q, v, a and dq.
-        """
+        """The coefficients q, v, a and the test function of the space, of which q, v, a and dq are made."""
         return self.made_of or (self.q, self.v, self.a, self.dq)
 
     def rate(self, x: Any) -> Any:

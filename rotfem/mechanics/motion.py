@@ -148,11 +148,12 @@ class Motion:
         cell: float | None = None,
         **more: Any,
     ) -> Motion:
-        """Return rotation at the speed that a function of time gives; see `from_callable`.
+        """Return rotation at the speed that a function of time gives.
 
         Args:
             speed: t (s) ↦ Omega (rad/s).
-            rate: t (s) ↦ dOmega/dt (rad/s²); differences of the speed if None, whose step follows the function.
+            rate: t (s) ↦ dOmega/dt (rad/s²); differences of the speed if None (`rotfem.mechanics.differentiation`),
+                which reach neither over a breakpoint nor before t = 0.
             angle: t (s) ↦ psi (rad); a quadrature of the speed if None.
             axis: direction of the angular velocity.
             breakpoints: times (s) between which the function is smooth, which steps then land on; where None, it is
@@ -165,7 +166,8 @@ class Motion:
         points = None if breakpoints is None else tuple(sorted(float(t) for t in breakpoints))
         known = points or ()
         state: dict[str, Any] = {"smooth": False, "breakpoints": points, "knots": known, "sharp": known}
-        return cls(*from_callable(speed, rate, angle, known, cell), about(axis), **(state | more))
+        rate = rate or Derivative(speed, 1, cell, (0.0, *known))
+        return cls(speed, rate, angle or integrated(speed, known), about(axis), **(state | more))
 
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
@@ -189,10 +191,7 @@ class Motion:
         return np.zeros(3) if self.base is None else self.base.at(t)
 
     def frame(self, t: float) -> dict[str, Array]:
-        """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
-
-        The velocity v_o is that by the pitch, without that of the hub's center.
-        """
+        """Return w, dw, a_o of the frame (rad/s, rad/s², m/s²), and v_o of its origin by the pitch, its components."""
         w, dw, a_o = self.speed(t) * self.axis, self.rate(t) * self.axis, self.base_acceleration(t)
         if self.pitch is None:
             return {"w": w, "dw": dw, "a_o": a_o}
@@ -226,10 +225,7 @@ class Motion:
 
 
 def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) of the spin-up Omega(t) = speed (t/T − sin(2πt/T)/2π), constant after T.
-
-    Kane, Ryan & Banerjee 1987; ICCIA 2017 eq. (17).
-    """
+    """Return (Omega, dOmega/dt, psi) of speed (t/T − sin(2πt/T)/2π), constant after T (ICCIA 2017 eq. (17))."""
     T, k = duration, 2 * pi / duration
 
     def rising(t: Any, sine: Callable[[Any], Any]) -> Any:
@@ -283,19 +279,8 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
     return speed, rate, lambda s: turned(s) - at_zero
 
 
-def from_callable(
-    speed: Scalar,
-    rate: Scalar | None,
-    angle: Scalar | None,
-    breakpoints: Sequence[float] = (),
-    cell: float | None = None,
-) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) for any function Omega(t); what is not given is computed from it.
-
-    The missing rate is of differences whose step follows the function (`rotfem.mechanics.differentiation`), and which
-    reach neither over a breakpoint nor before t = 0; the missing angle is an adaptive quadrature that goes on from the
-    last time asked for.
-    """
+def integrated(speed: Scalar, breakpoints: Sequence[float]) -> Scalar:
+    """Return psi of a speed: an adaptive quadrature that goes on from the last time asked for."""
     from scipy import integrate  # only a callable needs it, and it is slow to load
 
     last = [0.0, 0.0]
@@ -306,4 +291,4 @@ def from_callable(
         last[0] = t
         return last[1]
 
-    return (lambda t: float(speed(t)), rate or Derivative(speed, 1, cell, (0.0, *breakpoints)), angle or quadrature)
+    return quadrature

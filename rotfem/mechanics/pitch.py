@@ -45,12 +45,6 @@ def _parts_of_turn(*axis: float) -> tuple[Array, Array, Array]:
     return np.eye(3), cross, cross @ cross
 
 
-def in_turned_frame(axis: Array, phi: Any, v: Array) -> Array:
-    """Return the components Rᵀ v of vectors (…, 3) in a frame that is turned by φ (rad, (…, 1)) about a unit vector."""
-    _, cross, twice = _parts_of_turn(*axis)
-    return np.asarray(v - np.sin(phi) * (v @ cross.T) + (1 - np.cos(phi)) * (v @ twice.T))
-
-
 def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
     """Return whether the line through the root (m) along an axis misses the origin."""
     arm, along = np.asarray(root, dtype=float), np.asarray(axis, dtype=float)
@@ -129,7 +123,8 @@ class Pitch:
 
     def seen(self, phi: Array, v: Array) -> Array:
         """Return the components Rᵀ v of vectors (…, 3) of the hub's frame at turns φ (…, 1)."""
-        return in_turned_frame(self.axis, phi, v)
+        _, cross, twice = _parts_of_turn(*self.axis)
+        return np.asarray(v - np.sin(phi) * (v @ cross.T) + (1 - np.cos(phi)) * (v @ twice.T))
 
     def in_hub_axes(self, values: Array, t: float) -> Array:
         """Return vectors (…, 3 n), n of them one after the other, with components in the hub's frame."""

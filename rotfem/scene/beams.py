@@ -327,10 +327,7 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def is_round(self) -> bool:
-        """Whether it is straight, is the same in all directions about its axis, and no support turns.
-
-        Masses off the axis are unbalance, no asymmetry.
-        """
+        """Whether it is straight, the same in all directions about its axis but for unbalance, and no support turns."""
         if not self.is_straight or self.hinges or self.pitches or any(s.frame == "rotating" for s in self.supports):
             return False
         places = np.union1d(self.section.knots, self.length)

@@ -1,10 +1,12 @@
 """Files of a user that register theories, effects, motion laws, …: `rotfem --load FILE`, and [extensions] of a scene.
 
-Such a file is Python and is run as Python: a scene that loads one does whatever the file does.
+Such a file is Python and is run as Python: a scene that loads one does whatever the file does. So the files of a scene
+run only where its reader is told to trust it, or ROTFEM_TRUST is 1.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -16,8 +18,15 @@ from rotfem.errors import SceneError, shown
 from rotfem.scene.files import Unreadable, read_bytes
 from rotfem.scene.table import LISTED, SceneModel
 
+#: How to let a scene run code.
+TRUSTING = "--trust lets it (ROTFEM_TRUST=1; in Python load_scene(…, trust=True))"
+
 #: Resolved paths of the files that have been run.
 _LOADED: set[Path] = set()
+
+
+class Untrusted(SceneError):
+    """A scene would run Python."""
 
 
 class Extensions(SceneModel):
@@ -30,21 +39,25 @@ class Extensions(SceneModel):
     load: Annotated[tuple[str, ...], LISTED] = ()
 
 
-def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
-    """Run the files that the [extensions] table of a scene names; what is no list is left to its validation."""
+def load_wanted(tables: dict[str, Any], file: str, directory: str, trust: bool) -> None:
+    """Run the files that the [extensions] table of a scene names; what is no list is left to its validation.
+
+    Without trust in the scene they must have been run before, by it or by `--load`.
+    """
     table = tables.get("extensions")
     wanted = table.get("load") if isinstance(table, dict) else None
-    for name in [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []:
-        if isinstance(name, str) and name:
-            load(name, Path(directory) / name, file, "extensions.load")
+    names = [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []
+    paths = {name: Path(directory) / name for name in names if isinstance(name, str) and name}
+    unknown = [shown(path) for path in paths.values() if path.exists() and path.resolve() not in _LOADED]
+    if unknown and not (trust or os.environ.get("ROTFEM_TRUST") == "1"):
+        which = ", ".join(map(str, unknown))
+        raise Untrusted(file, "extensions.load", None, f"is Python of the scene that would run: {which}; {TRUSTING}")
+    for name, path in paths.items():
+        load(name, path, file, "extensions.load")
 
 
 def load(name: str, path: Path, file: str, key: str) -> None:
-    """Run a Python file that registers something, unless it has been run.
-
-    Where it cannot be read, or fails, what it has registered is taken back, and a SceneError says why, with the line:
-    of the key and the file that name it, under the name that the user has given.
-    """
+    """Run a Python file that registers something, once; where it fails, what it registered is taken back."""
     try:
         source = read_bytes(path)
         path = path.resolve()
@@ -73,11 +86,7 @@ def loaded() -> tuple[Path, ...]:
 
 
 def failure(error: Exception) -> str:
-    """Return the message of an unexpected error where files have been loaded, "" where none has.
-
-    Of an error that passes through a file it names the line. Of any other, as a wrong number of arguments, the
-    files are only where the fault may be.
-    """
+    """Return the message of an unexpected error that files may have to do with, with the line of a file; or ""."""
     for path in _LOADED:
         if any(frame.filename == str(path) for frame in traceback.extract_tb(error.__traceback__)):
             return f"{shown(path)}: {_described(error, path)}"

@@ -151,10 +151,7 @@ FROM_FILE = BeforeValidator(read_rows)
 
 
 def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
-    """Return the names of the columns, if the file has any, and the rows of a table of finite numbers in a CSV file.
-
-    `#` starts a comment. The first row is a header if none of its cells is a number.
-    """
+    """Return the names of the columns, if the first row has no number, and the rows of a CSV file; # is a comment."""
     try:
         lines = read_text(path).splitlines()
     except Unreadable as error:

@@ -120,10 +120,7 @@ class SweptLine:
         return self.knots
 
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) (see `ReferenceLine.at`).
-
-        The position is (∫ cos χ, ∫ sin χ, 0), exact, arc by arc.
-        """
+        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,), exact, arc by arc."""
         places = np.atleast_1d(np.asarray(x, dtype=np.float64))
         position = np.zeros((len(places), 3))
         for (a, first), (b, last) in pairwise(self.rows):

@@ -40,11 +40,7 @@ from rotfem.units import unit_of
 
 
 def abridged(value: Any, given: Any) -> Any:
-    """Return the tables of a validated scene with long tables of numbers replaced by what identifies them.
-
-    In their place stand the number of `rows` and `columns`, the `sha256` of the numbers (doubles, least byte first, row
-    after row), and the `file` where the user gave one: `given` are the same tables as they were given.
-    """
+    """Return the tables of a scene, long ones of numbers as rows, columns, SHA-256, and the file that is given."""
     if isinstance(value, Mapping):
         # A load may be given as the path of its table, without the table around it.
         below = given if isinstance(given, Mapping) else dict.fromkeys(value, given)
@@ -125,9 +121,9 @@ class Scene(SceneModel):
         return cls._validate(data, name, name, str(directory))
 
     @classmethod
-    def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
+    def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str, trust: bool = False) -> Self:
         tables, before = to_builtin(data), len(READ)
-        load_wanted(tables, file, directory)
+        load_wanted(tables, file, directory, trust)
         given = tables.get("motion")
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
@@ -207,7 +203,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
             why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give end, and step or tolerance'
+                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
@@ -226,19 +222,17 @@ class Scene(SceneModel):
         check_mesh(structure, self.mesh)
         check_prestress(structure, model)
         check_initial(structure, motion, model, self.initial)
-        if self.accuracy is None and self.accuracy_budget is not None:
-            raise problem("accuracy_budget", self.accuracy_budget, "is what an accuracy may take, and needs accuracy")
         if self.accuracy is not None and not self.output.error:
             why = "cannot be combined with accuracy, which is met by what is estimated"
             raise problem("output.error", False, why)
         self.output.check(structure.type, structure.length)
 
 
-def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Return the validated scene of a TOML file."""
+def load_scene(path: str | Path, overrides: Sequence[str] = (), trust: bool = False) -> Scene:
+    """Return the validated scene of a TOML file; trusted, it may run Python files (see `rotfem.scene.extensions`)."""
     path = Path(path)
     tables = apply_overrides(path.name, read_toml(path), overrides)
-    scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene = Scene._validate(tables, path.stem, path.name, str(path.parent), trust)
     scene._inputs = (path.absolute(), *scene._inputs)
     return scene
 

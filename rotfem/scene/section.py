@@ -66,10 +66,7 @@ OverSpan = Annotated[
 
 
 def _nested(value: Any) -> Any:
-    """Return rows of x and the entries of a point, or of a matrix, as [x, point or matrix].
-
-    A matrix has 36 entries row by row, or the 21 of its upper triangle.
-    """
+    """Return rows of x and the entries of a point, or of a matrix (36, or 21 of its upper triangle), as [x, it]."""
     if not isinstance(value, list | tuple):
         return value
     return [_row(row) if isinstance(row, list | tuple) and len(row) in (3, 22, 37) else row for row in value]
@@ -276,10 +273,7 @@ class PlanarSection(Section):
         return bool(np.any(self.at(self.knots)["rotary_inertia"] > 0.0))
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Return the section properties at positions x (m) along the beam, by name, each of the shape of x.
-
-        They are EA (N), GA (N), EI (N·m²), mass_per_length (kg/m) and rotary_inertia (kg·m).
-        """
+        """Return EA, GA (N), EI (N·m²), mass_per_length (kg/m), rotary_inertia (kg·m) at x (m), each of its shape."""
         x = np.asarray(x, dtype=np.float64)
         names = ("EA", "GA", "EI", "mass_per_length", "rotary_inertia")
         if self.way.name == "stiffness":
@@ -374,10 +368,7 @@ class SpatialSection(Section):
         return bool(np.any(self.at(self.knots)["mass"][..., 3:, 3:] != 0.0))
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Return the matrices `stiffness` and `mass` at positions x (m), shape (…), along the beam: (…, 6, 6).
-
-        They are in SI units and section axes.
-        """
+        """Return `stiffness` and `mass`, (…, 6, 6) in section axes and SI units, at positions x (m), (…)."""
         x = np.asarray(x, dtype=np.float64)
         if self.stiffness is not None and self.mass is not None:
             return {"stiffness": evaluate(self.stiffness, x), "mass": evaluate(self.mass, x)}

@@ -267,9 +267,6 @@ class Time(WithParameters):
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
         if self.output_step is not None and self.output_every != 1:
             raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
-        for key in ("max_step", "min_step"):
-            if self.tolerance is None and getattr(self, key) is not None:
-                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
 
 
 class ModesTable(SceneModel):
@@ -376,9 +373,6 @@ class OutputTable(SceneModel):
         if self.stations is None:
             if named and kind in FORCES:
                 raise problem("output.quantities", list(self.quantities), f'"{named[0]}" needs output.stations')
-            for key in ("every", "format"):
-                if getattr(self, key) != type(self).model_fields[key].default:
-                    raise problem(f"output.{key}", getattr(self, key), "has no meaning without output.stations")
             return
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)

@@ -182,10 +182,7 @@ def empty() -> Any:
 
 
 def one_of(tables: Mapping[str, type[SceneModel]], other: type[SceneModel] | None = None) -> PlainValidator:
-    """Return what reads a table of the type that its key `type` names; of any other type it is `other`, if given.
-
-    Not a union of pydantic's: the classes that a scene does not name need no validators, which take time to make.
-    """
+    """Return what reads a table of the type that its key `type` names, or `other`; it makes no other validators."""
 
     def read(value: Any, info: ValidationInfo) -> Any:
         if isinstance(value, SceneModel):
@@ -221,23 +218,14 @@ class Way:
 
 
 def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
-    """Return the way that the given keys make up; raise if none, saying what is missing or does not belong."""
-    keys = set(given)
-
-    def misfit(way: Way) -> tuple[bool, int]:
-        wrong_shape = "shape" in keys and way.shape != given["shape"]
-        return wrong_shape, len(set(way.required) - keys) + len(keys - {*way.required, *way.optional})
-
-    nearest = min(ways, key=misfit)
-    if misfit(nearest) == (False, 0):
-        return nearest
-    parts = [] if given else ["none is given"]
-    if given and (missing := [key for key in nearest.required if key not in keys]):
-        parts.append(f"missing {', '.join(missing)}")
-    if foreign := [key for key in given if key not in {*nearest.required, *nearest.optional}]:
-        parts.append(f"{', '.join(foreign)} cannot be combined with the rest")
+    """Return the way that the given keys make up; refuse other keys."""
+    for way in ways:
+        complete = {*way.required} <= given.keys() <= {*way.required, *way.optional}
+        if complete and way.shape in (None, given.get("shape")):
+            return way
     possible = "".join(f"\n    ({i}) {way}" for i, way in enumerate(ways, start=1))
-    raise problem("", None, f"not a complete set of keys: {'; '.join(parts)}; give exactly one of{possible}")
+    why = f"{', '.join(given) or 'nothing'} is not a complete set of keys; give exactly one of{possible}"
+    raise problem("", None, why)
 
 
 # --- errors -----------------------------------------------------------------------------------------------------------

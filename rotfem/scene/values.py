@@ -117,18 +117,14 @@ Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_st
 TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_times)]
 
 
-def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:
-    """Return whether a symmetric matrix is positive definite, or semidefinite to a slack, as mass without inertias is.
-
-    It is judged with ones on its diagonal, as its entries have different units and sizes: otherwise a soft direction
-    would pass for round-off, or the reverse.
-    """
+def is_positive(matrix: Array, definite: bool = True) -> bool:
+    """Return whether a symmetric matrix, with ones on its diagonal, is positive (semi)definite."""
     diagonal = np.diag(matrix)
     if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
         return False
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.max(diagonal) or 1.0))
     least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T) * np.outer(scale, scale))[0])
-    return least > 1e-12 if definite else least >= -slack
+    return least > 1e-12 if definite else least >= -ROUND_OFF
 
 
 def symmetric(size: int, definite: bool) -> AfterValidator:

@@ -187,19 +187,13 @@ def _load(gmsh: Any, path: Path) -> None:
 
 def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
     """Refuse a solid, and other physical groups than a clamp, further curves and the surfaces of the plate."""
-
-    def listed(dimension: int) -> str:
-        return ", ".join(f'"{name}"' for name in groups[dimension]) or "none"
-
-    if groups[3]:
-        raise BadMesh("it holds cells of dimension 3; a plate is a mesh of triangles or quadrilaterals in a plane")
-    if "clamped" not in groups[1]:
-        raise BadMesh(f'has no physical curve "clamped" (physical curves: {listed(1)})')
-    for name in surfaces:
-        if name not in groups[2]:
-            raise BadMesh(f'has no physical surface "{name}" (physical surfaces: {listed(2)})')
-    for name in groups[2].keys() - set(surfaces):
-        raise BadMesh(f'its physical surface "{name}" is not "plate", and structure.thickness has no such region')
+    for dimension, kind, wanted in ((1, "curve", ["clamped"]), (2, "surface", surfaces)):
+        for name in wanted:
+            if name not in groups[dimension]:
+                named = ", ".join(f'"{other}"' for other in groups[dimension]) or "none"
+                raise BadMesh(f'has no physical {kind} "{name}" (physical {kind}s: {named})')
+    for name in (*groups[3], *(groups[2].keys() - set(surfaces))):
+        raise BadMesh(f'its physical group "{name}" is of dimension 3, or no region of structure.thickness or "plate"')
 
 
 def _elements(gmsh: Any, dimension: int, name: str, tag: int) -> tuple[int, Integers]:

@@ -95,10 +95,7 @@ class Turns:
     # --- range ------------------------------------------------------------------------------------------------------
 
     def reached(self, q: Array, v: Array | None = None, h: float = 0.0) -> float:
-        """Return the part of the limit that the rotations of q (local dof array) take, over all processes.
-
-        With rates v (rad/s) it is, to be safe, what a step of twice the length h (s) would lead to.
-        """
+        """Return the part of the limit that rotations of q take, with rates v after a step of twice h (s)."""
         reach = self._reach(self._of(q))
         if v is not None:
             reach = reach + 2 * abs(h) * self._reach(self._of(v))

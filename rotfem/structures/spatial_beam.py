@@ -434,10 +434,7 @@ class SpatialBeam(Beam):
         return self._forms.strains(Gamma, K, self.dx_elastic, self._pretwist)
 
     def _measured(self, measures: Callable[..., tuple[Any, Any]]) -> tuple[Any, Any]:
-        """Return Γ and K of one theory's measures along t_i.
-
-        Counted from a reference they are those of a beam with the axis R e and the curvature of the reference.
-        """
+        """Return Γ and K of one theory's measures along t_i; from a reference with its axis R e and its curvature."""
         q, e = self.k.q, self._triad[0]
         dq = q.dx(0)
         du = ufl.as_vector([dq[i] for i in (0, 1, 2)])

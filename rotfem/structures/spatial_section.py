@@ -85,10 +85,7 @@ def moving_moments(masses: Array) -> tuple[list[tuple[int, int]], bool]:
 
 
 def euler_tensor(inertia: npt.ArrayLike) -> list[tuple[float, Array]]:
-    """Return pairs (moment, unit axis (3,)) of ∫ x xᵀ dm = ½ tr(J) 1 − J for an inertia tensor J (3, 3).
-
-    A rigid body has the rotary inertia of directors along these axes with these moments; zero ones are left out.
-    """
+    """Return pairs (moment, unit axis (3,)) of ∫ x xᵀ dm = ½ tr(J) 1 − J of an inertia tensor J; no zero ones."""
     J = np.asarray(inertia, dtype=float)
     E = 0.5 * np.trace(J) * np.eye(3) - J
     size = np.max(np.abs(J))

@@ -75,11 +75,10 @@ mesh.elements=2.0 -> integer
 mesh.elements=[2,2] -> integer
 mesh.degree=7 -> at most 6
 mesh.cell='triangle' -> unknown key
-time={end=1.0} -> @time.step exactly one
+time={end=1.0} -> @time.step give step
 time={step=0.1} -> @time.end required key is missing
 time={end=1.0, step=0} -> @time.step greater than 0
 time={end=1.0, step=2} -> @time.step at most time.end
-time={end=1.0, step=0.1, max_step=1} -> @time.max_step only with tolerance
 time={end=1.0, step=0.1, breakpoints=[-1]} -> @time.breakpoints.0 at least 0
 time={end=1.0, step=0.1, breakpoints=0.5} -> @time.breakpoints must be a list
 time={end=1.0, step=0.1, beta=0.3} -> @time.beta no meaning
@@ -98,9 +97,9 @@ structure.section.EA=[[0,1],[2, true]] -> must be a number
 structure.section.EA=[[0,1],[2]] -> more entries than 1
 structure.section.EA=[[0,1,2],[2,1,2]] -> at most 2 items
 structure.section.EA=[0,1] -> must be a list
-structure.section={} -> none is given
-structure.section={EA=1, GA=1, EI=1} -> missing mass_per_length
-structure.section={E=2e11, nu=0.3, rho=7800, shape='circle'} -> missing radius
+structure.section={} -> nothing is not a complete
+structure.section={EA=1, GA=1, EI=1} -> EA, GA, EI is not a complete
+structure.section={E=2e11, nu=0.3, rho=7800, shape='circle'} -> not a complete
 structure.section={E=2e11, nu=0.3, rho=7800, shape='tube', outer_radius=1, inner_radius=1} -> less than outer_radius
 structure.section={E=1, nu=0, rho=1, shape='tube', outer_radius=[[0,2],[10,1]], inner_radius=1.5} -> outer_radius
 structure.section={E=2e11, nu=0.6, rho=7800, shape='circle', radius=1} -> at most 0.5
@@ -149,7 +148,7 @@ loads.tip_moment=1 -> three components
 mesh.cell='triangel' -> 'quadrilateral' or 'triangle'
 mesh.elements=[2,0] -> @mesh.elements.1 at least 1
 structure.nu=0.5 -> less than 0.5
-structure.E1=1000000000.0 -> @structure cannot be combined
+structure.E1=1000000000.0 -> @structure not a complete
 structure.thickness={skin=0.1} -> needs a mesh
 structure.thickness=[[0,0.1],[1,0]] -> @structure.thickness.1.1 greater than 0
 structure.mesh='no.msh' -> file not found

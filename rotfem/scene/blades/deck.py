@@ -140,10 +140,7 @@ class Deck:
         known: Collection[str],
         needed: Sequence[str],
     ) -> tuple[Array, dict[str, Array], int]:
-        """Return the places of stations, parts of the length, the columns there by name, and their first line.
-
-        They stand below the line of their names, in which `words` are, and the line of units; the places come first.
-        """
+        """Return the places of stations, columns there by name, and their first line, below the line with `words`."""
         head = self.find(words)
         right = {name.lower(): name for name in known}
         first, *names = [right.get(word.lower(), word) for word in self.lines[head - 1].split()]

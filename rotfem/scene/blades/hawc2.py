@@ -168,11 +168,7 @@ def _products(table: dict[str, Array]) -> dict[str, Array]:
 
 
 def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
-    """Return columns with so many rows between theirs that products which are linear there are right to 1e-4.
-
-    Columns are linear between rows, so a product of two, linear between n parts, has 1/n² of the error of one part.
-    A frequency goes with the root of a product.
-    """
+    """Return columns with so many linear parts between rows that products linear there are right to 1e-4."""
     r = table["r"]
     ends, middle = _products(table), _products({name: (c[1:] + c[:-1]) / 2 for name, c in table.items()})
     off = np.max([np.abs((ends[key][1:] + ends[key][:-1]) / (2 * middle[key]) - 1.0) for key in ends], axis=0)

@@ -145,10 +145,7 @@ def _matrices(table: Node, length: float, upper: Array) -> list[list[Any]]:
 
 
 def _tree(deck: Deck) -> Any:
-    """Return the content of a YAML file, texts in the place of numbers; where PyYAML has libyaml, that parses it.
-
-    An anchor may be named again: YAML 1.2 allows it (section 3.2.2.2), PyYAML does not.
-    """
+    """Return the content of a YAML file as texts; anchors may be named again, as in YAML 1.2, not in PyYAML."""
     import yaml
 
     fast = (yaml.composer.Composer, yaml.cyaml.CParser, yaml.constructor.BaseConstructor, yaml.resolver.BaseResolver)
