@@ -266,7 +266,7 @@ class Sweep:
         found, count = self.known.pop(speed, None), self.count + SPARE
         self.solves += found is None
         if found is None and self.model is not None:
-            found = with_errors(self.analysis, self.model.modes(speed, count))
+            found = with_errors(self.model.modes(speed, count))
         found = found or self.analysis.at(speed, count, start)
         return SpeedPoint(found.first(count), requested)
 
@@ -310,7 +310,7 @@ class Sweep:
         self.paths.append(path)
 
     def _model(self, solved: Sequence[Spinning]) -> SpeedModel:
-        """Return the model between some speeds, which knows the points beside them, too."""
+        """Return the model between some speeds, which knows the points next to them, too."""
         if self.model is not None:
             return self.model
         points, low, high = [p.spinning for p in self.points], solved[0].speed, solved[-1].speed
@@ -320,7 +320,7 @@ class Sweep:
 
     def wave(self, point: SpeedPoint, branch: int) -> Wave | None:
         """Return how the mode of a branch precesses at a point; None where it is lost or no rotor's."""
-        waves = self.analysis.described(point.spinning).waves
+        waves = point.spinning.waves
         return waves[point.order[branch]] if waves and point.order[branch] >= 0 else None
 
     def direction(self, point: SpeedPoint, branch: int) -> str:

@@ -97,6 +97,7 @@ class Spinning:
     """The structure at one speed: its equilibrium, pencil and eigenpairs.
 
     Attributes:
+        analysis: of it.
         speed: Ω, rad/s.
         q: equilibrium, local dof array.
         pencil: M, C, K there.
@@ -105,9 +106,9 @@ class Spinning:
         rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
         reference: what the rotations of the equilibrium are counted from; None for the undeformed structure.
         lift: basis V that the vectors are coordinates in, and M V; None where they are those of the unknowns.
-        described: what the modes look like (see `ModalAnalysis.described`).
     """
 
+    analysis: ModalAnalysis
     speed: float
     q: Array
     pencil: Pencil
@@ -116,7 +117,6 @@ class Spinning:
     rigid: bool = False
     reference: Any = None
     lift: tuple[Array, Array] | None = None
-    described: Described | None = None
 
     def lifted(self, vectors: Array) -> Array:
         """Return vectors of the pairs as those of the locally owned unknowns, one column each."""
@@ -148,7 +148,63 @@ class Spinning:
 
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
-        return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)
+        return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))))
+
+    @cached_property
+    def _energies(self) -> Array:
+        """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
+        names, X, MX = self.analysis.structure.unknowns, self.right, self.mass_right
+        shape = (self.analysis.structure.V.dofmap.index_map.size_local, len(names), X.shape[1])
+        owned = shape[0] * shape[1]
+        x, mx = (self.analysis.structure.oriented(Y[:owned].reshape(shape)) for Y in (X, MX))
+        hub = np.real(np.sum(X[owned:].conj() * MX[owned:], axis=0))  # on the last rank
+        energies = summed(self.analysis.comm, np.vstack([np.real(np.sum(x.conj() * mx, axis=0)), hub]))
+        return np.asarray(energies / energies.sum(axis=0))
+
+    @cached_property
+    def shares(self) -> dict[str, Array]:
+        """Family ↦ share of the kinetic energy x^H M x in its components, (m,); of a free hub that of the hub too."""
+        shares = {
+            name: self._energies[list(i)].sum(axis=0) for name, (i, _) in self.analysis.structure.families.items()
+        }
+        return shares | ({"hub": self._energies[-1]} if self.analysis.free else {})
+
+    @property
+    def rotary(self) -> Array:
+        """Share of the rotations of the nodes in the kinetic energy of every mode, (m,)."""
+        turns = [i for i, name in enumerate(self.analysis.structure.unknowns) if not name.startswith("u")]
+        return np.asarray(self._energies[turns].sum(axis=0))
+
+    @cached_property
+    def waves(self) -> list[Wave]:
+        """How every mode of a shaft or a disk precesses; empty for other structures.
+
+        The sense of the spin counts, without spin that of its axis.
+        """
+        axis = np.asarray(self.analysis.system.motion.axis) * (-1.0 if self.speed < 0.0 else 1.0)
+        found = []
+        for x in self.right.T:
+            coordinates, values = self.analysis.structure.nodes(x)
+            wave = self.analysis.structure.wave(coordinates, values, axis)
+            if wave is None:
+                return []
+            found.append(replace(wave, fixed=self.analysis.fixed))
+        return found
+
+    @cached_property
+    def names(self) -> list[ModeName]:
+        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
+        families, out = [name for name in self.shares if name != "hub"], []
+        for j, x in enumerate(self.right.T):
+            first, *others = sorted(families, key=lambda name: -self.shares[name][j])
+            name = self.analysis.structure.mode_name(first, *self.analysis.structure.nodes(x))
+            out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)
+        pencil, pairs, speed = self.pencil, self.pairs, self.speed
+        if pencil.damped and np.any(pairs.values.imag == 0.0):
+            local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
+            sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
+            out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
+        return with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
 
 
 def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
@@ -267,7 +323,7 @@ class ModalAnalysis:
         rigid = self.free and pairs.bounds[slowest] >= 1.0
         flexible = np.delete(np.arange(len(pairs.values)), [slowest] if rigid else [])
         pairs = pairs.select(flexible[: massed(clamped.M)])
-        found = Spinning(speed, q, pencil, pairs, clamped, rigid, self.system.reference)
+        found = Spinning(self, speed, q, pencil, pairs, clamped, rigid, self.system.reference)
         self.separate(found)
         if any(support.of_frequency for support in getattr(self.problem.structure, "supports", ())):
             self._at_own_frequencies(found)
@@ -288,7 +344,7 @@ class ModalAnalysis:
         """Return what `at` has found before, or on another process, of its parts."""
         self.system.count_rotations_from(reference)
         pencil, clamped = self.pencils(speed, q)
-        return Spinning(speed, q, pencil, pairs, clamped, rigid, reference)
+        return Spinning(self, speed, q, pencil, pairs, clamped, rigid, reference)
 
     def _at_own_frequencies(self, spinning: Spinning) -> None:
         """Solve every mode again with the supports as they are at its own frequency of whirl, in place.
@@ -303,7 +359,7 @@ class ModalAnalysis:
                 lam = last.pairs.values[0]
                 frame.whirl = abs(float(lam.imag))
                 pencil, clamped = self.pencils(spinning.speed, spinning.q)
-                found = Spinning(spinning.speed, spinning.q, pencil, pencil.solve(count), clamped)
+                found = replace(spinning, pencil=pencil, clamped=clamped, pairs=pencil.solve(count))
                 self.separate(found)
                 i = np.argmax(correlation(last, found)[1], axis=1)
                 last = replace(found, pairs=found.pairs.select(i))
@@ -381,78 +437,6 @@ class ModalAnalysis:
             s.count_rotations_from(start.reference)
         first = None if start is None else start.q
         return steady_state(s, speed, self.newton, first, self.notes)
-
-    def described(self, spinning: Spinning) -> Described:
-        """Return what the modes at a speed look like."""
-        if spinning.described is None:
-            spinning.described = Described(self, spinning)
-        return spinning.described
-
-
-class Described:
-    """What modes look like; computed when it is asked for.
-
-    Args:
-        analysis: of the modes.
-        spinning: the structure at their speed.
-    """
-
-    def __init__(self, analysis: ModalAnalysis, spinning: Spinning):
-        self._analysis, self._spinning, self._structure = analysis, spinning, analysis.structure
-
-    @cached_property
-    def _energies(self) -> Array:
-        """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
-        names, X, MX = self._structure.unknowns, self._spinning.right, self._spinning.mass_right
-        shape = (self._structure.V.dofmap.index_map.size_local, len(names), X.shape[1])
-        owned = shape[0] * shape[1]
-        x, mx = (self._structure.oriented(Y[:owned].reshape(shape)) for Y in (X, MX))
-        hub = np.real(np.sum(X[owned:].conj() * MX[owned:], axis=0))  # on the last rank
-        energies = summed(self._analysis.comm, np.vstack([np.real(np.sum(x.conj() * mx, axis=0)), hub]))
-        return np.asarray(energies / energies.sum(axis=0))
-
-    @cached_property
-    def shares(self) -> dict[str, Array]:
-        """Family ↦ share of the kinetic energy x^H M x in its components, (m,); of a free hub that of the hub too."""
-        shares = {name: self._energies[list(i)].sum(axis=0) for name, (i, _) in self._structure.families.items()}
-        return shares | ({"hub": self._energies[-1]} if self._analysis.free else {})
-
-    @property
-    def rotary(self) -> Array:
-        """Share of the rotations of the nodes in the kinetic energy of every mode, (m,)."""
-        turns = [i for i, name in enumerate(self._structure.unknowns) if not name.startswith("u")]
-        return np.asarray(self._energies[turns].sum(axis=0))
-
-    @cached_property
-    def waves(self) -> list[Wave]:
-        """How every mode of a shaft or a disk precesses; empty for other structures.
-
-        The sense of the spin counts, without spin that of its axis.
-        """
-        axis = np.asarray(self._analysis.system.motion.axis) * (-1.0 if self._spinning.speed < 0.0 else 1.0)
-        found = []
-        for x in self._spinning.right.T:
-            coordinates, values = self._structure.nodes(x)
-            wave = self._structure.wave(coordinates, values, axis)
-            if wave is None:
-                return []
-            found.append(replace(wave, fixed=self._analysis.fixed))
-        return found
-
-    @cached_property
-    def names(self) -> list[ModeName]:
-        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
-        families, out = [name for name in self.shares if name != "hub"], []
-        for j, x in enumerate(self._spinning.right.T):
-            first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            name = self._structure.mode_name(first, *self._structure.nodes(x))
-            out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)
-        pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
-        if pencil.damped and np.any(pairs.values.imag == 0.0):
-            local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
-            sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
-            out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
-        return with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
 
 
 def stability(lam: complex, bound: float = 0.0) -> str:

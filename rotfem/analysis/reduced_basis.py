@@ -114,6 +114,7 @@ class SpeedModel:
     The basis V is orthonormal in unknowns of comparable size, W its dual one, WᵀV = 1.
 
     Args:
+        analysis: of the modes.
         vectors: complex ones that the basis spans with their conjugates, owned rows (n, m).
         nodes: speed (rad/s) and pencil of each place that the polynomials go through.
         even: whether K is a polynomial of Ω², or else of Ω.
@@ -124,8 +125,10 @@ class SpeedModel:
         checks: speeds of full solutions, with the largest relative difference of a frequency there.
     """
 
-    def __init__(self, vectors: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int):
-        self.count, self._even = count, even
+    def __init__(
+        self, analysis: ModalAnalysis, vectors: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int
+    ):
+        self.analysis, self.count, self._even = analysis, count, even
         self.checks: list[dict[str, float]] = []
         speeds, matrices, self._asymmetries = list[float](), list[list[Array]](), dict.fromkeys("MCK", 0.0)
         for speed, pencil in nodes:
@@ -175,7 +178,7 @@ class SpeedModel:
         except ComputationError:  # K is singular: aim beside zero
             least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
             pairs = pencil.first(count, 0.1 * float(np.sqrt(least)))
-        return Spinning(speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
+        return Spinning(self.analysis, speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
 
     def singular(self, low: float, high: float) -> Array:
         """Return the speeds between two at which K is singular, increasing; K is taken to be linear in Ω² there."""
@@ -190,7 +193,7 @@ class SpeedModel:
             return s
         right, left = (summed(self.comm, product(self._dual.T, v)) for v in (s.right, s.lifted(s.pairs.left)))
         pairs, pencil = replace(s.pairs, right=right, left=left), self._pencil(s.speed)
-        return Spinning(s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
+        return Spinning(self.analysis, s.speed, s.q, pencil, pairs, pencil, lift=self.lift)
 
 
 def between(solved: Sequence[Spinning], neighbours: Sequence[Spinning]) -> SpeedModel:
@@ -205,7 +208,9 @@ def between(solved: Sequence[Spinning], neighbours: Sequence[Spinning]) -> Speed
     further = [s.pairs.left[:, (s.pairs.values.imag == 0.0) | (not s.pencil.conservative)] for s in solved]
     vectors = np.hstack([*(s.pairs.right for s in solved), *further])
     nodes = {s.speed: s.pencil for s in (*solved, *neighbours) if s.speed * (low + high) >= 0.0}
-    return SpeedModel(vectors, nodes.items(), low * high >= 0.0, max(len(s.pairs.values) for s in solved))
+    return SpeedModel(
+        solved[0].analysis, vectors, nodes.items(), low * high >= 0.0, max(len(s.pairs.values) for s in solved)
+    )
 
 
 def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> SpeedModel | None:
@@ -226,7 +231,7 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
 
     def model() -> SpeedModel:
         nodes = ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in (first, 0.5 * (first + last), last))
-        return SpeedModel(np.hstack(columns), nodes, False, count)
+        return SpeedModel(analysis, np.hstack(columns), nodes, False, count)
 
     solved(first)
     solved(last)
@@ -246,8 +251,9 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
     return None if gaps else found
 
 
-def with_errors(analysis: ModalAnalysis, found: Spinning) -> Spinning:
+def with_errors(found: Spinning) -> Spinning:
     """Return modes of a model over a range, with their errors in the full system."""
+    analysis = found.analysis
     pencil = analysis.pencils(found.speed, analysis.system.zeros(), keep=False)[0]
     values, right, left = found.pairs.values, found.right, found.lifted(found.pairs.left)
     values, bounds = RoundOff(pencil).corrected(values, left, right)

@@ -192,10 +192,10 @@ def diagram(
             raise
         stopped, sweep.only = stop, True
         orders, crossings, onsets = meetings(sweep, marks.orders)
-    labels, last = branch_labels(analysis, sweep), sweep.points[-1]
+    labels, last = branch_labels(sweep), sweep.points[-1]
     errors = branch_errors(scene, analysis, sweep) if scene.output.error and stopped is None else None
     mesh = None if errors is None else errors.each
-    rows = [row for point in sweep.points for row in point_rows(analysis, point, labels, mesh)]
+    rows = [row for point in sweep.points for row in point_rows(point, labels, mesh)]
     check_rows(rows)
     for crossing in crossings:
         if "label" in crossing:  # of no branch, it is known by its name
@@ -350,7 +350,7 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> li
     return out
 
 
-def branch_labels(analysis: ModalAnalysis, sweep: Sweep) -> list[str]:
+def branch_labels(sweep: Sweep) -> list[str]:
     """Return the names of the branches: of their modes at the first speed, of a rotor where most of them precess."""
 
     def precessing(point: SpeedPoint) -> tuple[int, int]:
@@ -358,7 +358,7 @@ def branch_labels(analysis: ModalAnalysis, sweep: Sweep) -> list[str]:
         return len(there), sum(sweep.direction(point, b) != "" for b in there)
 
     point = max(sweep.points, key=precessing)  # the first of several
-    names = analysis.described(point.spinning).names
+    names = point.spinning.names
     return distinct([names[point.order[b]] for b in range(sweep.count)])
 
 
@@ -380,11 +380,9 @@ def branch_errors(scene: Scene, analysis: ModalAnalysis, sweep: Sweep) -> Errors
     return replace(worst, each=list(map(_finite, np.fmax(*np.array(each)))))
 
 
-def point_rows(
-    analysis: ModalAnalysis, point: SpeedPoint, labels: list[str], mesh: Sequence[float | None] | None
-) -> list[dict[str, Any]]:
+def point_rows(point: SpeedPoint, labels: list[str], mesh: Sequence[float | None] | None) -> list[dict[str, Any]]:
     """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
-    columns, rows = mode_rows(analysis, point.spinning.first(1 + max(point.order[: len(labels)]))), []
+    columns, rows = mode_rows(point.spinning.first(1 + max(point.order[: len(labels)]))), []
     own = ["frequency", "frequency_hz", "damping", "growth", "residual", "error_bound"]
     of_rotors = ["turning", "whirl", "frequency_fixed", "frequency_fixed_2", "log_decrement"]
     for b, label in enumerate(labels):

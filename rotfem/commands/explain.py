@@ -291,7 +291,7 @@ class Explanation:
         (_, system, newton), count = self._of(variant), variant.modes.count
         analysis = ModalAnalysis(system.model.problem, variant.modes.about, newton, system.comm, system)
         spinning = with_plain_tangents(system, lambda: analysis.at(self.speed, count))
-        names = analysis.described(spinning).names[: count - int(spinning.rigid)]
+        names = spinning.names[: count - int(spinning.rigid)]
         lasting = [name.rest != "fast" for name in names]
         return Output(Spectrum(np.asarray(spinning.pairs.resolved[: len(names)][lasting])))
 

@@ -18,24 +18,22 @@ from rotfem.units import speed_text
 Array = npt.NDArray[Any]
 
 
-def mode_tables(
-    analysis: ModalAnalysis, spinning: Spinning, count: int, formats: tuple[str, ...] | None = None
-) -> ModesResult:
+def mode_tables(found: Spinning, count: int, formats: tuple[str, ...] | None = None) -> ModesResult:
     """Return the first modes at a speed, with warnings of the model and of instabilities."""
-    speed, rigid, structure = spinning.speed, int(spinning.rigid), analysis.structure
-    spinning = spinning.first(count - rigid)
-    rows = mode_rows(analysis, spinning)
-    stability, warnings = remarks(analysis, spinning, rows)
+    analysis, rigid, structure = found.analysis, int(found.rigid), found.analysis.structure
+    spinning = found.first(count - rigid)
+    rows = mode_rows(spinning)
+    stability, warnings = remarks(spinning, rows)
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
-    scaled = spinning.pairs.right / scales(analysis, spinning)
+    scaled = spinning.pairs.right / scales(spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
     if rigid:  # hub and structure turn together, λ = 0
-        columns = rows[0] if rows else mode_rows(analysis, spinning.first(1))[0]
+        columns = rows[0] if rows else mode_rows(found.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
         rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
     summary = {
-        **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
+        **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": found.speed},
         **{"effects": list(analysis.model.effects), "modes": rows, "shapes": {"length": structure.length}},
         **{"stability": stability.summary(), "warnings": warnings},
     }
@@ -46,9 +44,9 @@ def mode_tables(
     return out
 
 
-def remarks(analysis: ModalAnalysis, spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
+def remarks(spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
     """Return the stability of the equilibrium, and warnings of it, of the model, and of modes that grow."""
-    found = stability_of_pencil(spinning.pencil, spinning.clamped)
+    analysis, found = spinning.analysis, stability_of_pencil(spinning.pencil, spinning.clamped)
     out = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(rows)]
     out += critical(rows, spinning.speed, analysis.fixed)
     # An instability that grows by more than those of the modes that are asked for is none of them.
@@ -58,10 +56,10 @@ def remarks(analysis: ModalAnalysis, spinning: Spinning, rows: list[dict[str, An
     return found, out
 
 
-def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
+def mode_rows(spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
-    rows, pairs, described = [], spinning.pairs, analysis.described(spinning)
-    names, waves = distinct(described.names), described.waves
+    rows, pairs, waves = [], spinning.pairs, spinning.waves
+    names = distinct(spinning.names)
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam) if bound < 1.0 else 0.0  # else λ is zero to round-off, whose sign is no damping
         rows.append(
@@ -73,7 +71,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 "damping": float(-lam.real / size) if size > 0.0 else 0.0,
                 "growth": float(lam.real),
                 "stability": stability(lam, float(bound)),
-                **{f"share_{name}": float(share[i]) for name, share in described.shares.items()},
+                **{f"share_{name}": float(share[i]) for name, share in spinning.shares.items()},
                 **(whirl(waves[i], lam, abs(spinning.speed)) if waves else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
@@ -143,18 +141,18 @@ def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
     return found
 
 
-def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:
+def scales(spinning: Spinning) -> Array:
     """Return what the eigenvectors are divided by, complex, (modes,).
 
     The largest translation u of a mode is then 1 and real: that of the vector, over the structure and the phase,
     max_φ |Re(u e^{iφ})|² = ½(|u|² + |u·u|), with u·u e^{2iφ} real. Of a mode whose kinetic energy is for the most part
     that of rotations, it is the largest rotation times the length of the structure.
     """
-    moves = analysis.structure.moves
-    out, right, turned = [], spinning.pairs.right, analysis.described(spinning).rotary > 0.5
+    structure = spinning.analysis.structure
+    out, right, turned = [], spinning.pairs.right, spinning.rotary > 0.5
     for i in range(right.shape[1]):
-        values = analysis.structure.nodes(right[:, i])[1]
-        translations, rotations = values[:, moves], analysis.structure.length * values[:, ~moves]
+        values = structure.nodes(right[:, i])[1]
+        translations, rotations = values[:, structure.moves], structure.length * values[:, ~structure.moves]
         z = rotations if turned[i] or not np.any(translations) else translations
         squares = np.sum(z * z, axis=1)
         largest = int(np.argmax(np.sum(np.abs(z) ** 2, axis=1) + np.abs(squares)))

@@ -132,7 +132,7 @@ def _modes(
     hints = hints_of(analysis, scene, hint, speed)
     spinning = analysis.at(speed, scene.modes.count) if known is None else known.spinning
     # matrices last where other modes are computed after these
-    found = mode_tables(analysis, spinning, scene.modes.count, formats=scene.output.fields)
+    found = mode_tables(spinning, scene.modes.count, formats=scene.output.fields)
     seconds = cpu_time() - Compiling.seconds - began
     check_rows(found.rows)
     held = beyond(problem, [speed], [row["frequency"] for row in found.rows])

@@ -271,7 +271,7 @@ class Problem(ProblemData):
         problem = self.spinning() if speed != 0.0 else self
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
-        return mode_tables(analysis, analysis.at(speed, count), count)
+        return mode_tables(analysis.at(speed, count), count)
 
     def _speed(self, speed: float | str | None) -> float:
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")

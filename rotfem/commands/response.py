@@ -218,8 +218,8 @@ def result_of(
         for name, answer in zip(outputs, answers, strict=True):
             row |= {name: float(abs(answer)), f"{name}_phase": float(np.angle(answer))}
         rows.append(row | {"peak": int(peak)})
-    modes = mode_rows(analysis, spinning)
-    stability, said = remarks(analysis, spinning, modes)
+    modes = mode_rows(spinning)
+    stability, said = remarks(spinning, modes)
     held = beyond(analysis.problem, [spinning.speed])
     warnings = [*frozen_in_frame(analysis.problem), *held, *said, *doubtful(modes)]
     warnings += [no_damping(modes, undamped)] if undamped else []

@@ -3,6 +3,15 @@
 A mode e^{iωt} of a rotor is a sum of two circular waves, a e^{i(mθ + ωt)} with the spin and b e^{i(mθ − ωt)} against
 it, θ the angle about the axis, counted in the sense of the spin; of a shaft z = u_2 + i u_3 = a e^{iωt} + b e^{−iωt},
 m = 1 (Genta, Dynamics of Rotating Systems, 2005, section 2.4). From the fixed frame they have ω + mΩ and ω − mΩ.
+
+A mode is named by these rules, one after the other:
+
+1. The family that has most of its kinetic energy, and one more than the nodes of its shape there; of a plate its nodal
+   lines (`Structure.mode_name`).
+2. Of less than 0.8 of the energy, the next family too (`ModeName.mixed_with`).
+3. Overdamped, it is slow or fast, and its number its place in the family (`with_overdamped`).
+4. Of a rotor that precesses, forward or backward whirl by its place, or a disk's wave (`with_whirl`).
+5. Those that are called the same have letters (`distinct`).
 """
 
 from __future__ import annotations

@@ -135,21 +135,18 @@ def test_what_cannot_be_done(rotfem: Rotfem, arguments: tuple[str, ...], status:
     assert not Path("results").exists()
 
 
-@pytest.mark.parametrize("command", [("modes",), ("campbell", "--speeds", "0:4:3")])
 @pytest.mark.parametrize(
-    ("changes", "allowed"),
+    ("command", "changes", "allowed"),
     [
-        ((), 36),  # 3 unknowns at 12 nodes
-        (('motion={type="torque", hub_inertia=1.0, pulses=[[0.0, 1.0, 1.0]]}', "time={end=1.0, step=0.1}"), 37),
-        (('structure={type="plate", length=1.0, width=0.5, thickness=0.1, E=1e6, nu=0.3, rho=1.0}',), 30),
+        (("modes",), (), 36),  # 3 unknowns at 12 nodes
+        (("campbell", "--speeds", "0:4:3"), (), 36),
+        (("modes",), ('motion={type="torque", hub_inertia=1.0}', "time={end=1.0, step=0.1}"), 37),
     ],
-    ids=["beam", "free hub", "plate"],
 )
 def test_more_modes_than_unknowns(
-    folder: Path, rotfem: Rotfem, command: tuple[str, ...], changes: tuple[str, ...], allowed: int
+    rotfem: Rotfem, command: tuple[str, ...], changes: tuple[str, ...], allowed: int
 ) -> None:
-    grid = "mesh={elements=[1, 1], degree=2}" if "plate" in "".join(changes) else "mesh={elements=4, degree=3}"
-    options = [part for change in (*changes, grid, f"modes.count={allowed + 1}") for part in ("--set", change)]
+    options = [part for change in (*changes, f"modes.count={allowed + 1}") for part in ("--set", change)]
     done = rotfem(command[0], "beam.toml", *command[1:], *options)
     assert done.status == 2, done.err
     (told,) = done.err.splitlines()

@@ -128,7 +128,7 @@ def test_blade_table(theory: str, tip_mass: float, table: dict[float, tuple[floa
     analysis = ModalAnalysis(Problem.of(blade).spinning())
     for speed, printed in table.items():
         spinning = analysis.at(speed, 12)
-        names = map(str, analysis.described(spinning).names)
+        names = map(str, spinning.names)
         found = dict(zip(names, spinning.pairs.values.imag, strict=True))
         for n, value in enumerate(printed, start=1):
             digits = 3 if tip_mass == 0.0 or (n == 1 and value < 10) else 2
