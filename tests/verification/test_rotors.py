@@ -499,6 +499,17 @@ def test_rotor_with_three_disks_of_lalanne_and_ferraris() -> None:
     np.testing.assert_allclose(np.array(speeds) * 30 / np.pi, [3620.4, 3798.1, 10018.0, 11279.0], rtol=1e-3)
 
 
+def test_free_tube() -> None:
+    """Nothing holds it: six rigid motions, then pairs of bending as ROSS has them (its issue 885), 2e-4."""
+    section = {"shape": "tube", "outer_radius": 0.01504, "inner_radius": 0.0035, "E": 2.1e11, "nu": 0.3, "rho": 7850}
+    free = ["u1", "u2", "u3", "theta1", "theta2", "theta3"]
+    structure = {"type": "spatial_beam", "length": 0.3, "root": {"free": free}, "section": section}
+    motion = {"type": "constant", "speed": 0.0, "axis": [1, 0, 0]}
+    found = rotfem.modes({"structure": structure, "motion": motion, "modes": {"count": 10}}).frequencies
+    assert np.all(found[:6] < 1e-3 * found[6])
+    np.testing.assert_allclose(found[6:], [9647.0, 9647.0, 25317.0, 25317.0], rtol=2e-4)
+
+
 def test_stiff_tension_takes_no_digits() -> None:
     """EA = GA = 1e14 on bearings that differ by direction: frequencies of an own Timoshenko code, 1e-4."""
     supports = [{"x": x, "stiffness": [[7.5e5, 0], [0, 1.25e6]]} for x in (0.0, 1.5)]
