@@ -68,7 +68,7 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
         what = "there is no static answer to a force: a mode has the frequency zero to round-off"
         raise ComputationError(what, advice="a spring at a hinge that nothing holds")
     pairs, n = spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values)))), np.diag(spinning.own)
-    tip = structure.tip_values.columns(len(spinning.q))
+    tip = structure.tip_values.columns(len(spinning.q))[:, : len(structure.components)]
     blocks, rows, columns = [], [], []
     for j, lam in enumerate(pairs.values):
         gain, shape = tip.T @ pairs.left[:, j].conj() / n[j], tip.T @ pairs.right[:, j]
@@ -112,12 +112,12 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
                 matrix = csr_array(matrix.toarray() + A.added(np.eye(len(spinning.q))[:, free])[free])
             mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
             save_npz(folder / f"{name}.npz", matrix)
-        bs = len(structure.components)
+        names = structure.unknowns
         x = structure.V.tabulate_dof_coordinates()
         lines = ["row,x1,x2,x3,component"]
         for row, dof in enumerate(free):
-            where = ",".join(repr(float(c)) for c in x[dof // bs])
-            lines.append(f"{row},{where},{structure.components[dof % bs]}")
+            where = ",".join(repr(float(c)) for c in x[dof // len(names)])
+            lines.append(f"{row},{where},{names[dof % len(names)]}")
         (folder / "unknowns.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return [*paths, folder / "unknowns.csv"]
 

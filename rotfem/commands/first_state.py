@@ -115,8 +115,7 @@ def of_mode(initial: Initial, number: int, analysis: ModalAnalysis) -> tuple[Arr
     structure, value = system.structure, spinning.pairs.values[number - 1]
     x = spinning.right[:, number - 1]
     whole = with_ghosts(system.V, x.real) + 1j * with_ghosts(system.V, x.imag)
-    moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
-    tip = structure.tip_values(whole)[moves]
+    tip = structure.whole_values(structure.tip_values(whole))[structure.moves]
     largest = tip[np.argmax(np.abs(tip))]
     if abs(largest) <= 1e-6 * system.size(np.abs(whole)) * structure.length:  # it does not take part
         raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
