@@ -102,12 +102,44 @@ def blade(main: str, elements: int, speeds: list[float]) -> tuple[float, Values]
     return diagram({**scene.tables, **more, "modes": {"count": 5}}, speeds, 5)
 
 
-def diagram(tables: dict[str, Any], speeds: list[float], count: int) -> tuple[float, Values]:
+def rotor(elements: int, bearing: dict[str, float]) -> dict[str, Any]:
+    """Return ROSS's example rotor with other bearings."""
+    matrices = {
+        name: [[bearing.get(c + d, 0.0) for d in row] for row in (("xx", "xy"), ("yx", "yy"))]
+        for name, c in (("stiffness", "k"), ("damping", "c"))
+    }
+    disk = {"outer_diameter": 0.28, "inner_diameter": 0.05, "width": 0.07, "rho": 7810.0}
+    section = {"shape": "circle", "radius": 0.025, "E": 211e9, "nu": 211e9 / 81.2e9 / 2 - 1, "rho": 7810.0}
+    structure = {"type": "spatial_beam", "length": 1.5, "section": section, "root": {"driven": True}}
+    structure |= {"supports": [{"x": x, **matrices} for x in (0.0, 1.5)]}
+    return {
+        "structure": structure | {"masses": [{"x": x, "disk": disk} for x in (0.5, 1.0)]},
+        "motion": {"type": "constant", "speed": 0.0, "axis": [1, 0, 0]},
+        "loads": {"unbalance": [{"x": 0.5, "kg_m": 1e-3, "phase": 0.5}]},
+        "mesh": {"elements": elements, "degree": 3},
+        "modes": {"count": 5},
+    }
+
+
+def whirl(elements: int, bearing: dict[str, float], speeds: list[float]) -> tuple[float, Values]:
+    """Four frequencies of bending at each speed of a shaft."""
+    return diagram(rotor(elements, bearing), speeds, 4, without="1st torsion")
+
+
+def unbalance(elements: int, bearing: dict[str, float], speeds: list[float]) -> tuple[float, Values]:
+    """Amplitudes along both directions at the first disk at each speed, under its unbalance."""
+    started = process_time()
+    found = rotfem.unbalance(rotor(elements, bearing), speeds).at(0.5)
+    return process_time() - started, [list(map(float, row)) for row in zip(found["u2"], found["u3"], strict=True)]
+
+
+def diagram(tables: dict[str, Any], speeds: list[float], count: int, without: str = "") -> tuple[float, Values]:
     """Return seconds of a Campbell diagram, and its frequencies (rad/s)."""
     started = process_time()
     result = rotfem.campbell(tables, speeds, orders=0)
     seconds = process_time() - started
-    rows = [[row["frequency"] for row in result.rows if row["speed"] == speed] for speed in speeds]
+    kept = [row for row in result.rows if row["label"] != without]
+    rows = [[row["frequency"] for row in kept if row["speed"] == speed] for speed in speeds]
     return seconds, [sorted(row)[:count] for row in rows]
 
 

@@ -7,8 +7,9 @@ repetition of a case runs each program once, in a process of its own, one thread
 second time is measured, in CPU time: of histories the time loop, of frequencies all of it. Errors are relative: of a
 history the largest of the tip's u₂ over the instants of the table by the largest |u₂|, of frequencies the largest one
 at the first and the last speed. References share no code with any of the programs (`tests/reference`); for the blade it
-is pyBModes with 800 elements (`docs/blades.md`). What each program is given (mesh, steps, tolerance) is in `CASES`:
-by trial, the cheapest that meets the error in the case's name, of frequencies about one error for both.
+is pyBModes with 800 elements (`docs/blades.md`), for the rotors ROSS with 48. What each program is given (mesh, steps,
+tolerance) is in `CASES`: by trial, the cheapest that meets the error in the case's name, of frequencies about one error
+for both.
 """
 
 from __future__ import annotations
@@ -34,15 +35,18 @@ REFERENCE = HERE.parent.parent / "tests" / "reference"
 FOLDER = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rotfem" / "peers"
 
 #: Programs, and what pip is asked for; None is this one.
-PROGRAMS = {"rotfem": None, "exudyn": "exudyn", "pybmodes": "pybmodes"}
+PROGRAMS = {"rotfem": None, "exudyn": "exudyn", "pybmodes": "pybmodes", "ross": "ross-rotordynamics==2.3.0 plotly<6"}
 
 #: Programs that are not run, and why.
 MISSING = {
     "CalculiX": "Debian 13 has no package of it (calculix-ccx), PyPI neither",
-    "ROSS": "it computes shafts on bearings, none of these cases",
 }
 
 SPEEDS = [float(s) for s in np.linspace(0.0, 12.0, 50)]
+WHIRL = [float(s) for s in np.linspace(4.0, 400.0, 100)]
+#: Bearings, N/m and N·s/m; those of the second couple.
+BEARING = {"kxx": 1e6, "kyy": 8e5, "cxx": 200.0, "cyy": 150.0}
+COUPLED = {"kxx": 1.2e6, "kxy": 3e5, "kyx": -6e5, "kyy": 2e6, "cxx": 3e3, "cxy": -8e2, "cyx": -7e2, "cyy": 5e3}
 RATED = 12.1 * np.pi / 30  # rad/s
 UNIT = np.sqrt(70e9 * 0.01**2 / (12 * (1 - 0.3**2) * 2700.0))  # of the plate, rad/s
 DECK = "nrel5mw_land/NRELOffshrBsline5MW_Onshore_ElastoDyn.dat"
@@ -77,6 +81,18 @@ CASES: dict[str, dict[str, tuple[str, dict[str, Any]] | str]] = {
         "rotfem": ("blade", {"elements": 16, "speeds": [float(s) for s in np.linspace(0.0, RATED, 50)]}),
         "pybmodes": ("blade", {"elements": 100, "speeds": [float(s) for s in np.linspace(0.0, RATED, 50)]}),
     },
+    "rotor, whirl at 100 speeds": {
+        "rotfem": ("whirl", {"elements": 3, "bearing": BEARING, "speeds": WHIRL}),
+        "ross": ("whirl", {"elements": 12, "bearing": BEARING, "speeds": WHIRL}),
+    },
+    "rotor, coupled bearings, whirl": {
+        "rotfem": ("whirl", {"elements": 3, "bearing": COUPLED, "speeds": WHIRL}),
+        "ross": ("whirl", {"elements": 12, "bearing": COUPLED, "speeds": WHIRL}),
+    },
+    "rotor, coupled bearings, unbalance": {
+        "rotfem": ("unbalance", {"elements": 3, "bearing": COUPLED, "speeds": WHIRL}),
+        "ross": ("unbalance", {"elements": 12, "bearing": COUPLED, "speeds": WHIRL}),
+    },
 }
 
 
@@ -97,7 +113,7 @@ def install() -> dict[str, str]:
     for program, package in PROGRAMS.items():
         if package is None or subprocess.run([python, "-c", f"import {program}"], capture_output=True).returncode == 0:
             continue
-        done = subprocess.run([python, "-m", "pip", "install", "-q", package], capture_output=True, text=True)
+        done = subprocess.run([python, "-m", "pip", "install", "-q", *package.split()], capture_output=True, text=True)
         if done.returncode:
             missing[program] = (done.stderr.strip().splitlines() or ["pip failed"])[-1]
     return missing
@@ -126,6 +142,12 @@ def exact(case: str) -> list[list[float]]:
     if case.startswith("5 MW"):
         hertz = [[0.6777, 1.0864, 1.9543, 4.0090, 4.5556], [0.7291, 1.0954, 2.0135, 4.0315, 4.6100]]
         return [[2 * np.pi * f for f in row] for row in hertz]
+    if case.startswith("rotor"):  # ROSS with 48 elements
+        if case.endswith("unbalance"):
+            return [[2.0742344e-08, 1.8069099e-08], [3.3919672e-05, 5.3011529e-05]]
+        if "coupled" in case:
+            return [[102.38796, 107.64681, 328.07216, 406.16175], [103.2165, 106.62311, 335.13241, 399.0053]]
+        return [[91.799102, 96.292472, 274.59038, 296.56103], [91.646083, 96.401605, 268.1667, 302.78786]]
     if case.startswith("plate"):
         return [plate_at(0.0), plate_at(10.0)]
     with (REFERENCE / "euler_bernoulli_rotating.csv").open(encoding="utf-8") as file:

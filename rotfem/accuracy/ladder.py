@@ -305,7 +305,7 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
                 found.rows[0]["error"] = there.size  # that of the first, but for the error of this one
         errors.parts = {"discretisation" if answers.moving else "space": error, **model.parts, **answers.neglected}
         if (lost := answer.outcome.round_off) is not None:
-            errors.parts["round_off"] = lost
+            errors.parts["round_off"] = lost if before is None else min(lost, there.size)  # see `errors.estimate`
         found.keep(answer, errors, accuracy)
         following = max(at.values()) + 1
         if found.met or (model.parts.get("model") or 0.0) > accuracy:

@@ -23,10 +23,6 @@ R = TypeVar("R", bound=Result)
 ROOT_MOMENT = "root_moment"
 
 
-class Missed(ComputationError):
-    """No setting was found that meets the accuracy."""
-
-
 def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
     """Refuse an accuracy of something else than what a command computes, by its verb."""
     if scene.accuracy_of not in (None, *wanted):
@@ -106,7 +102,7 @@ def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish:
     raise missed
 
 
-def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> Missed:
+def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> ComputationError:
     """Return the error that says what the best answer reached instead of an accuracy, and what failed after it."""
     known = {name: part for name, part in errors.parts.items() if part is not None}
     unknown = [WORDS[name] for name in errors.parts if name not in known]
@@ -121,4 +117,4 @@ def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> M
         reached = f"an error of {errors.total:.2g} was reached, most of it ({WORDS[worst]}) {known[worst]:.2g}"
     why = "" if failure is None else f", and a further attempt failed: {failure.what}"
     what = f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}"
-    return Missed(what, advice=(failure.advice if failure is not None else None) or advice)
+    return ComputationError(what, advice=(failure.advice if failure is not None else None) or advice)

@@ -49,7 +49,9 @@ def sweep(
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(metavar="FILE", parser=as_path, help="blade file", show_default=False)],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", parser=as_path, help="blade or rotor file", show_default=False)
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE", parser=as_path, help="scene to write")],
     kind: Annotated[
         str | None, typer.Option("--format", metavar="NAME", help="format, if the file does not say")
@@ -61,9 +63,9 @@ def import_(
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
-    """Write the scene of a blade FILE of another program.
+    """Write the scene of a blade or rotor FILE of another program.
 
-    It may be of BeamDyn, ElastoDyn, OpenFAST, BModes, HAWC2 or windIO.
+    It may be of BeamDyn, ElastoDyn, OpenFAST, BModes, HAWC2, windIO or ROSS.
     """
     from rotfem.commands.import_blade import import_blade, write_imported
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -101,12 +102,14 @@ def verb_on(
     ] = False,
     no_plots: NoPlots = False,
     report: Annotated[bool, typer.Option("--report", help="write report.html, a page that shows all of it")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help="let SCENE run the Python files it names")] = False,
     no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> Iterator[Session]:
     """Give a verb the session of its scene; these are, but for its name, the options of all verbs."""
     from rotfem.scene import load_scene
+    from rotfem.scene.extensions import Untrusted
 
     with Session(as_json, quiet, debug, no_plots) as session:
         if verb == "check" and scene.is_dir():
@@ -118,7 +121,14 @@ def verb_on(
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         if no_error:
             wanted.append("output.error=false")
-        loaded = session.scene = load_scene(scene, [*(overrides or ()), *wanted])
+        changes = [*(overrides or ()), *wanted]
+        try:
+            loaded = load_scene(scene, changes, trust)
+        except Untrusted as error:
+            if not (sys.stdin.isatty() and sys.stderr.isatty()) or not typer.confirm(f"{error}\nRun it?", err=True):
+                raise
+            loaded = load_scene(scene, changes, True)
+        session.scene = loaded
         modules = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
         if absent := next((name for name in modules if find_spec(name) is None), ""):
             lacking = f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"

@@ -1,10 +1,12 @@
 """Files of a user that register theories, effects, motion laws, …: `rotfem --load FILE`, and [extensions] of a scene.
 
-Such a file is Python and is run as Python: a scene that loads one does whatever the file does.
+Such a file is Python and is run as Python: a scene that loads one does whatever the file does. So the files of a scene
+run only where its reader is told to trust it, or ROTFEM_TRUST is 1.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import traceback
 from pathlib import Path
@@ -16,8 +18,15 @@ from rotfem.errors import SceneError, shown
 from rotfem.scene.files import Unreadable, read_bytes
 from rotfem.scene.table import LISTED, SceneModel
 
+#: How to let a scene run code.
+TRUSTING = "--trust lets it (ROTFEM_TRUST=1; in Python load_scene(…, trust=True))"
+
 #: Resolved paths of the files that have been run.
 _LOADED: set[Path] = set()
+
+
+class Untrusted(SceneError):
+    """A scene would run Python."""
 
 
 class Extensions(SceneModel):
@@ -30,13 +39,21 @@ class Extensions(SceneModel):
     load: Annotated[tuple[str, ...], LISTED] = ()
 
 
-def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
-    """Run the files that the [extensions] table of a scene names; what is no list is left to its validation."""
+def load_wanted(tables: dict[str, Any], file: str, directory: str, trust: bool) -> None:
+    """Run the files that the [extensions] table of a scene names; what is no list is left to its validation.
+
+    Without trust in the scene they must have been run before, by it or by `--load`.
+    """
     table = tables.get("extensions")
     wanted = table.get("load") if isinstance(table, dict) else None
-    for name in [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []:
-        if isinstance(name, str) and name:
-            load(name, Path(directory) / name, file, "extensions.load")
+    names = [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []
+    paths = {name: Path(directory) / name for name in names if isinstance(name, str) and name}
+    unknown = [shown(path) for path in paths.values() if path.exists() and path.resolve() not in _LOADED]
+    if unknown and not (trust or os.environ.get("ROTFEM_TRUST") == "1"):
+        which = ", ".join(map(str, unknown))
+        raise Untrusted(file, "extensions.load", None, f"is Python of the scene that would run: {which}; {TRUSTING}")
+    for name, path in paths.items():
+        load(name, path, file, "extensions.load")
 
 
 def load(name: str, path: Path, file: str, key: str) -> None:

@@ -121,9 +121,9 @@ class Scene(SceneModel):
         return cls._validate(data, name, name, str(directory))
 
     @classmethod
-    def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str) -> Self:
+    def _validate(cls, data: Mapping[str, Any], name: str, file: str, directory: str, trust: bool = False) -> Self:
         tables, before = to_builtin(data), len(READ)
-        load_wanted(tables, file, directory)
+        load_wanted(tables, file, directory, trust)
         given = tables.get("motion")
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
@@ -228,11 +228,11 @@ class Scene(SceneModel):
         self.output.check(structure.type, structure.length)
 
 
-def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Return the validated scene of a TOML file."""
+def load_scene(path: str | Path, overrides: Sequence[str] = (), trust: bool = False) -> Scene:
+    """Return the validated scene of a TOML file; trusted, it may run Python files (see `rotfem.scene.extensions`)."""
     path = Path(path)
     tables = apply_overrides(path.name, read_toml(path), overrides)
-    scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene = Scene._validate(tables, path.stem, path.name, str(path.parent), trust)
     scene._inputs = (path.absolute(), *scene._inputs)
     return scene
 

@@ -60,6 +60,7 @@ def summary(
     options = [word for change in changes for word in ("--set", change)]
     path, before = str(FILES / f"{file}.py"), ["--load", str(FILES / f"{file}.py")]
     if by != "--load":
+        options.append("--trust")
         text = Path(scene).read_text().split("[extensions]")[0]
         Path(scene).write_text(text + f'[extensions]\nload = ["{path}"]\n')
         before = []
@@ -153,7 +154,12 @@ def test_design(rotfem: Rotfem, folder: Path) -> None:
 def test_scene_loads_a_file_beside_it(rotfem: Rotfem, folder: Path) -> None:
     (folder / "mine.py").write_text((FILES / "linear_drag.py").read_text())
     (folder / "beam.toml").write_text(SCENE + '[extensions]\nload = ["mine.py"]\n')
-    done = rotfem("run", "beam.toml", "--json", "--no-plots", "-o", "out")
+    for verb in ("check", "run"):  # neither runs code of a scene that is not trusted
+        done = rotfem(verb, "beam.toml", "-o", "out")
+        assert (done.status, "drag" in registry.effects) == (2, False)
+        assert done.err.startswith("rotfem: beam.toml: extensions.load: is Python of the scene that would run: mine.py")
+        assert done.err.count("\n") == 1
+    done = rotfem("run", "beam.toml", "--trust", "--json", "--no-plots", "-o", "out")
     assert "drag" in json.loads(done.out)["effects"]
     assert not (folder / "__pycache__").exists()
     done = rotfem(
@@ -181,7 +187,7 @@ def test_files_that_fail(rotfem: Rotfem, folder: Path, by: str, content: str | N
         done = rotfem("--load", "mine.py", "run", "beam.toml", "-o", "out")
     else:
         (folder / "beam.toml").write_text(SCENE + '[extensions]\nload = "mine.py"\n')
-        done = rotfem("run", "beam.toml", "-o", "out")
+        done = rotfem("run", "beam.toml", "--trust", "-o", "out")
     assert done.status == 2
     where = 'command line: --load = "mine.py"' if by == "--load" else 'beam.toml: extensions.load = "mine.py"'
     assert done.err.startswith(f"rotfem: {where}: {message}")

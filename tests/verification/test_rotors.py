@@ -884,6 +884,12 @@ def test_every_table_says_its_frame() -> None:
     for row in unequal.rows:
         both = sorted([row["frequency_fixed"], row["frequency_fixed_2"]])
         np.testing.assert_allclose(both, sorted([abs(row["frequency"] - 50.0), row["frequency"] + 50.0]))
+    turning = rotfem.campbell(scene, [10.0, 30.0, 50.0], only=True)
+    figure = turning.plot(drawing="campbell_fixed")
+    check(figure)
+    drawn = {round(float(y), 9) for line in figure.axes[0].lines for y in np.asarray(line.get_ydata(), dtype=float)}
+    first = turning.branches()[turning.labels[0]]
+    assert {round(y, 9) for name in ("frequency_fixed", "frequency_fixed_2") for y in first[name].tolist()} <= drawn
 
 
 def test_shafts_are_drawn_as_they_are_built() -> None:
