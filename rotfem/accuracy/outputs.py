@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 from dolfinx import fem, mesh
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.schemes import Array, State
@@ -77,6 +75,9 @@ def chords(system: System) -> float:
     domain = plate.mesh
     if plate.type != "plate" or domain.geometry.cmap.degree > 1:
         return 0.0
+    from scipy.sparse import coo_array  # only meshes of plates need it, and it is slow to load
+    from scipy.sparse.csgraph import connected_components
+
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(1, 0)
     facets = mesh.exterior_facet_indices(domain.topology)
