@@ -285,17 +285,16 @@ def scheme_of(time: Time) -> Scheme:
 def motion_of(scene: Scene) -> Motion:
     """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
-    given, more = m.base_acceleration, dict[str, Any]()
+    given = m.base_acceleration
     base = None if given is None else load_of("motion.base_acceleration", given, scene.structure, float)
-    if m.type not in _MOTIONS or m.type == "callable":
-        more["cell"] = cell_of(scene.time)
-    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, "base": base, **more})
+    more = {"axis": m.axis, "base": base}
+    if m.type in _MOTIONS:
+        motion: Motion = _MOTIONS[m.type](m, more)
+    else:  # functions of time, of a script or of a registered law
+        law = getattr(m, "law", m)
+        more |= {"breakpoints": getattr(law, "breakpoints", None), "cell": cell_of(scene.time)}
+        motion = Motion.from_functions(law.speed, law.rate, law.angle, **more)
     return with_pitch(scene, motion) if scene.structure.pitches else motion
-
-
-def _by_law(m: Any, more: dict[str, Any]) -> Motion:
-    law = m.law
-    return Motion.from_functions(law.speed, law.rate, law.angle, breakpoints=law.breakpoints, **more)
 
 
 def _torque(m: Any, more: dict[str, Any]) -> Motion:
@@ -310,7 +309,6 @@ _MOTIONS: dict[str, Any] = {
     "constant": lambda m, more: Motion.constant_speed(m.speed, **more),
     "spin_up": lambda m, more: Motion.spin_up(m.speed, m.duration, **more),
     "table": lambda m, more: Motion.from_table(m.table, m.interpolation, **more),
-    "callable": lambda m, more: Motion.from_functions(m.speed, m.rate, m.angle, **more),
     "torque": _torque,
 }
 

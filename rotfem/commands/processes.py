@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -60,15 +60,10 @@ def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.C
     except (ComputationError, InputError) as error:
         problem = error
     parts = comm.allgather((done, problem))
-    raise_first(problem for _, problem in parts)
+    for _, found in parts:
+        if found is not None:
+            raise found
     return [found for part, _ in parts for found in part]
-
-
-def raise_first(problems: Iterable[Exception | None]) -> None:
-    """Raise the first problem that one of the ranks has; nothing where none has one."""
-    for problem in problems:
-        if problem is not None:
-            raise problem
 
 
 # --- what the summaries of all commands have in common ----------------------------------------------------------------

@@ -67,7 +67,8 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
     It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it. With
-    `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds.
+    `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds;
+    those of a shaft with both frequencies |ω ± Ω|.
     """
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
     rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
@@ -103,6 +104,14 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
         axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
+    for name, columns in result.branches().items() if fixed else ():
+        if "frequency_fixed_2" in columns:
+            other = units.frequencies(columns["frequency_fixed_2"])
+            thin = style_of(name) | {
+                "lw": 0.7,
+                "label": "_" if name != branches[0].name else "smaller wave of |ω ± Ω|",
+            }
+            axis.plot(units.speeds(columns["speed"]), np.where(other <= top, other, np.nan), **thin)
     crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)

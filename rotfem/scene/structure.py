@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from inspect import signature
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
@@ -259,25 +260,14 @@ class StructureTable(SceneModel):
     #: Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only.
     is_planar: ClassVar[bool] = False
 
-    @property
-    def nodes(self) -> tuple[float, ...]:
-        """Places (m) along a beam, increasing, that its mesh must have nodes at: masses, and kinks of its axis."""
-        return ()
-
-    @property
-    def hinges(self) -> dict[int, Any]:
-        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
-        return {}
-
-    @property
-    def pitches(self) -> bool:
-        """Whether it has a pitch that changes with time."""
-        return False
-
-    @property
-    def mesh_file(self) -> str | None:
-        """Absolute path of the file that its mesh is in, None if [mesh] has numbers of elements."""
-        return None
+    #: Places (m) along a beam, increasing, that its mesh must have nodes at: masses, and kinks of its axis.
+    nodes: ClassVar[Any] = ()
+    #: Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it.
+    hinges: ClassVar[Any] = MappingProxyType({})
+    #: Whether it has a pitch that changes with time.
+    pitches: ClassVar[Any] = False
+    #: Absolute path of the file that its mesh is in, None if [mesh] has numbers of elements.
+    mesh_file: ClassVar[Any] = None
 
 
 def check_one_hub(hub_radius: float, hub_offset: tuple[float, float, float] | None) -> None:

@@ -18,7 +18,6 @@ import rotfem
 from rotfem.commands.problem import motion_of
 from rotfem.errors import Fault, SceneError
 from rotfem.scene import (
-    PlanarBeamStructure,
     PlateStructure,
     Scene,
     SpatialBeamStructure,
@@ -223,11 +222,6 @@ def test_effective_effects(scene_file: Path, override: str) -> None:
     assert list(effects) == [name for name in rotfem.registry.effects.names if name in effects]
 
 
-def test_point_masses_are_tip_masses() -> None:
-    plate = scene("plate", structure__point_masses=[[1.0, 0.5, 2.0]])
-    assert "tip_mass" in rotfem.Problem.of(plate).effective_effects()
-
-
 # --- check_run ------------------------------------------------------------------------------------------------------
 
 
@@ -279,12 +273,6 @@ def scene_file(tmp_path: Path) -> Path:
     path = tmp_path / "my_beam.toml"
     path.write_text(tomli_w.dumps(tables()))
     return path
-
-
-def test_load_scene(scene_file: Path) -> None:
-    loaded = load_scene(str(scene_file))
-    assert isinstance(loaded.structure, PlanarBeamStructure)
-    assert (loaded.name, loaded.file, loaded.structure.length) == ("my_beam", "my_beam.toml", 10.0)
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:

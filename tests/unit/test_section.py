@@ -131,15 +131,6 @@ def test_spatial_axial_force_at_the_tension_center_does_not_bend() -> None:
     np.testing.assert_allclose(strain, [force / 3, 0, 0, 0, 0, 0], atol=1e-15)
 
 
-def test_spatial_matrices_are_returned_at_every_position() -> None:
-    stiffness = np.diag([3.0, 1, 2, 5, 7, 11])
-    stiffness[3, 4] = stiffness[4, 3] = 1.5
-    section = spatial(stiffness=stiffness, mass=np.eye(6))
-    np.testing.assert_array_equal(section.at(X)["stiffness"], np.broadcast_to(stiffness, (3, 6, 6)))
-    assert section.uniform
-    assert section.has_rotary_inertia
-
-
 def test_definiteness_does_not_depend_on_units() -> None:
     section = spatial(stiffness=np.diag([1e12, 1e12, 1e12, 1e-3, 1e-3, 1e-3]), mass=np.diag([1.0, 1, 1, 1, 1, 0]))
     assert section.at(0.0)["stiffness"][5, 5] == 1e-3
@@ -204,19 +195,6 @@ def test_matrices_in_columns_and_in_files_of_their_own(tmp_path: Path) -> None:
         np.testing.assert_allclose(beam.section.at(0.7)["stiffness"], K, rtol=1e-14)
 
 
-def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
-    (tmp_path / "EI.csv").write_text("x, EI\n0, 2\n1, 1\n2, 1")
-    structure = {
-        "type": "planar_beam",
-        "length": 2.0,
-        "section": {"EA": 1, "GA": 1, "EI": "EI.csv", "mass_per_length": 1},
-    }
-    tables = {"structure": structure, "motion": {"type": "constant", "speed": 1.0}}
-    assert Scene.from_dict(tables, directory=tmp_path).structure.section.EI == ((0.0, 2.0), (1.0, 1.0), (2.0, 1.0))
-    (tmp_path / "twist.csv").write_text("0, 0.1\n2, 0")
-    assert of_files(tmp_path, SPATIAL, pretwist="twist.csv").pretwist == ((0.0, 0.1), (2.0, 0.0))
-
-
 @pytest.mark.parametrize(
     ("text", "section", "message"),
     [
@@ -229,7 +207,6 @@ def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
             {"file": "blade.csv"},
             r"section\.mass_center_2: unknown key",
         ),
-        (BLADE_CSV.replace("1.5, 1", "1.5, one"), {"file": "blade.csv"}, "line 4 must be 10"),
         (BLADE_CSV.replace(", -0.5", ""), {"file": "blade.csv"}, "line 4 must be 10"),
         (BLADE_CSV.replace("\n2,", "\n1,"), {"file": "blade.csv"}, "it ends at 1"),
         ("0, 3\n2, 1", {"file": "blade.csv"}, "its first row must name the columns"),
