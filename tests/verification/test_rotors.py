@@ -365,6 +365,14 @@ def test_peak_of_an_unbalance_has_its_amplification_factor() -> None:
         check(draw())
 
 
+def test_peaks_of_an_undamped_shaft_have_no_height() -> None:
+    """Which is said; of one that bearings damp it is not."""
+    for damping, said in ((0.0, True), (100.0, False)):
+        scene = shaft_on_bearings(2e4, damping, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]})
+        warnings = rotfem.unbalance(scene, [30.0, 50.0]).summary["warnings"]
+        assert any("nothing damps" in text for text in warnings) == said
+
+
 @pytest.mark.parametrize("theory", ["linear", "reissner"])
 def test_a_history_ends_in_the_whirl_of_its_unbalance(theory: str) -> None:
     """Bearings that differ by direction and cross-couple, an offset mass: the end of a history is the orbit, 1e-3."""
