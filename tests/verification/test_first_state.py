@@ -94,7 +94,7 @@ def test_loads_over_time_and_gravity_are_frozen_at_the_start() -> None:
 def test_modes_are_about_what_a_history_starts_with() -> None:
     """Gravity across the axis and loads over time are dead loads of t = 0: the same modes at the same equilibrium."""
     tables = scene({}, model={"theory": "reissner"})
-    over_time = {"gravity": [0.0, -9.81], "distributed": [[0.0, 0.0, 20.0], [1.0, 0.0, 0.0]]}
+    over_time = {"gravity": [0.0, -9.81], "distributed": {"over_time": [[0.0, 0.0, 20.0], [1.0, 0.0, 0.0]]}}
     turning, frozen = tables | {"loads": over_time}, tables | {"loads": {"distributed": [0.0, 20.0 - 1.2 * 9.81]}}
     found = rotfem.modes(turning)
     np.testing.assert_allclose(found.frequencies, rotfem.modes(frozen).frequencies, rtol=1e-8)
