@@ -36,9 +36,9 @@ def main(figure: Path | None = None) -> float:
     result = rotfem.cost(scene, **(FEW if figure is None else MANY))
     for theory, floor in result.summary["model_errors"].items():
         say(f"{theory:18s} least error {100 * floor:.4f} %")
-    for entry in result.summary["recommendations"]:
-        if entry["row"] is not None:
-            say(f"for {entry['accuracy']:g}: {entry['setting']}, {entry['row']['cost']:.3f} s")
+    for accuracy in (1e-2, 1e-3, 1e-4):
+        if (row := result.recommend(accuracy)) is not None:
+            say(f"for {accuracy:g}: {row['words']}, {row['cost']:.3f} s")
     error = float(result.summary["model_errors"]["consistent_linear"])
     report("error of the consistent linear theory", error, REFERENCE, "(–)")
     if figure is not None and FIRST_RANK:

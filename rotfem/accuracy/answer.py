@@ -71,15 +71,27 @@ class Setting:
             steps = self.tolerance ** (-1.0 / registry.schemes[str(self.scheme)].order)
         return steps * (math.prod(n * self.degree for n in cells) if isinstance(cells, tuple) else cells * self.degree)
 
-    def changes(self) -> dict[str, Any]:
-        """Return the scene's keys ↦ values of this setting; None removes what the scene says."""
+    def changes(self, scene: Scene) -> dict[str, Any]:
+        """Return the keys ↦ values of a scene with this setting and without an accuracy; None removes a key."""
         out: dict[str, Any] = {"model.theory": self.theory, "mesh.degree": self.degree}
+        out |= dict.fromkeys(("accuracy", "accuracy_budget"))
+        if scene.model.prestress is not None and not registry.theories[self.theory].prestress:
+            out |= {"model.prestress": None}
         if self.effects is not None:
             out["model.effects"] = list(self.effects)
         if self.elements is not None:
             out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
-        if self.moving:
+        time = scene.time
+        if time is not None and self.moving:
+            if self.scheme != time.scheme:
+                out |= {f"time.{name}": None for name in time.parameters}
+            if self.step != time.step:  # numbers of steps are those of others
+                out |= {"time.output_every": None}
+            if self.tolerance is None:
+                out |= {"time.min_step": None}
             out |= {f"time.{name}": getattr(self, name) for name in ("scheme", "tolerance", "step", "max_step")}
+        elif time is not None:  # its tolerance may be that of the accuracy
+            out |= {"time.tolerance": time.tolerance}
         return out
 
     def summary(self) -> dict[str, Any]:
@@ -126,6 +138,10 @@ class Outcome(Protocol):
     @property
     def lines(self) -> list[Array]:
         """Coordinates (m) of all vertices of the mesh along each axis."""
+
+    @property
+    def chords(self) -> float:
+        """Error by straight edges along curves, relative; 0 without (see `rotfem.accuracy.outputs`)."""
 
     @property
     def round_off(self) -> float | None:
@@ -208,20 +224,7 @@ class Answers:
 
     def variant(self, setting: Setting) -> Scene:
         """Return the scene with a setting, without an accuracy and without errors of its own."""
-        changes: dict[str, Any] = dict.fromkeys(("accuracy", "accuracy_budget"))
-        time = self.scene.time
-        if time is not None and not setting.moving:  # its tolerance may be that of the accuracy
-            changes |= {"time.tolerance": time.tolerance}
-        if time is not None and setting.moving:
-            if setting.scheme != time.scheme:
-                changes |= {f"time.{name}": None for name in time.parameters}
-            if setting.step != time.step:  # numbers of steps are those of others
-                changes |= {"time.output_every": None}
-            if setting.tolerance is None:
-                changes |= {"time.min_step": None}
-        if self.scene.model.prestress is not None and not registry.theories[setting.theory].prestress:
-            changes |= {"model.prestress": None}
-        return self.scene.replace({**changes, **setting.changes(), "output.error": False})
+        return self.scene.replace({**setting.changes(self.scene), "output.error": False})
 
     def keep(self, answer: Answer) -> None:
         """Keep an answer that was computed elsewhere; histories have its rows."""

@@ -7,6 +7,8 @@ Let e be the error of an answer, q e that of the coarser one, and d their distan
 with r the ratio of their steps or cells and p the order (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993,
 section II.4). That the order holds is shown by a third answer, coarser in the same ratio. With d' its distance to the
 second one, q is d'/d, but at most what theory says. Where q is small, e is at most the larger one of both distances.
+Where d is smaller than the highest order of a smooth answer makes it, d'/rᵖ, it is so by chance, and that takes its
+place.
 
 - Of steps p is 2: higher orders are reduced by stiff components (Hairer & Wanner 1996, section IV.15). Vibrations that
   are out of phase in one of the answers have no order, so without a third answer d is not divided.
@@ -14,7 +16,8 @@ second one, q is d'/d, but at most what theory says. Where q is small, e is at m
   sections 1.6 and 6.3), one less where tables have kinks. Where a distance is above `ASYMPTOTIC`, or there is no third
   answer, it is max(2, k), and without both d is not divided.
 - Of plates p is `CORNER`. Above `ASYMPTOTIC`, where the corners of the clamp are not what counts, it is max(2, k).
-- Where cells cannot be halved, the other answer has elements of one degree less, or of one more where those lock.
+- Where cells cannot be halved, the other answer has elements of one degree more, on plates and mesh files of one less,
+  unless those lock.
 
 The error of a theory is the distance of the coarser answer to that of the richest theory.
 """
@@ -32,6 +35,7 @@ from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Elements, Setting, distance
 from rotfem.analysis.schemes import LONGEST
 from rotfem.errors import ComputationError, InputError
+from rotfem.results.columns import ShortTable
 from rotfem.results.distance import Distance, Spectrum
 from rotfem.scene import Scene
 
@@ -54,6 +58,10 @@ CORNER = 1.5
 #: Loosest tolerance of adaptive steps.
 LOOSEST = 0.5
 
+#: Elements of a second answer of a beam below which the third one has fewer than four, longer than half a wave of some
+#: modes, and a small q shows nothing.
+FEW = 7
+
 #: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
 FEWER = 0.75
 
@@ -63,6 +71,9 @@ FLOOR = 1e-9
 #: Error from which a warning names its cures; error of a theory from which it is warned of.
 NOTICED, OUT_OF_RANGE = 0.01, 0.05
 
+#: Characters of a line of the table of settings.
+LINE = 120
+
 #: Contributions to an error as they are called in text.
 WORDS = {
     "discretisation": "steps and mesh",
@@ -71,7 +82,11 @@ WORDS = {
     "model": "theory",
     "effects": "effects left out",
     "round_off": "round-off",
+    "geometry": "straight edges along curves",
 }
+
+#: What is better where a mesh has straight edges along curves.
+ORDER_2 = "cells of order 2 follow them (gmsh: Mesh.ElementOrder = 2)"
 
 # --- the coarser answer -----------------------------------------------------------------------------------------------
 
@@ -84,11 +99,13 @@ class Coarser:
         setting: it.
         far: the ratio of their errors where distances are above `ASYMPTOTIC`, or there are only two answers.
         near: where three answers are nearer.
+        most: the highest that smooth answers have.
     """
 
     setting: Setting
     far: float
     near: float
+    most: float
 
 
 def in_longer_steps(own: Setting, end: float) -> Coarser | None:
@@ -101,20 +118,21 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
     order = order_of(own)
     if own.step is not None:
         ratio = 2.0 ** min(CERTAIN, order)
-        return Coarser(replace(own, step=2 * own.step), ratio, ratio) if 2 * own.step <= end else None
+        setting = replace(own, step=2 * own.step)
+        return Coarser(setting, ratio, ratio, 2.0**order) if 2 * own.step <= end else None
     assert own.tolerance is not None
     tolerance = min(own.tolerance * 2.0**order, LOOSEST)
     ratio = (tolerance / own.tolerance) ** (1.0 / order)
     longest = min(2.0 * (own.max_step or LONGEST * end), end)
     setting = replace(own, tolerance=tolerance, max_step=longest)
-    return Coarser(setting, ratio**CERTAIN, ratio**CERTAIN) if ratio > 1.1 else None
+    return Coarser(setting, ratio**CERTAIN, ratio**CERTAIN, ratio**order) if ratio > 1.1 else None
 
 
 def on_other_meshes(own: Setting) -> list[Coarser]:
     """Return settings on half the cells, of one degree less, and of one more; elements of degree 1 lock."""
     k = own.degree
-    degrees = [Coarser(replace(own, degree=k - 1), 2.0, 2.0)] if k > 2 else []
-    degrees.append(Coarser(replace(own, degree=k + 1), 1.0 + BEYOND, 1.0 + BEYOND))
+    degrees = [Coarser(replace(own, degree=k - 1), 2.0, 2.0, 2.0)] if k > 2 else []
+    degrees.append(Coarser(replace(own, degree=k + 1), *[1.0 + BEYOND] * 3))
     if own.elements is None:
         return degrees
     plate = isinstance(own.elements, tuple)
@@ -122,9 +140,9 @@ def on_other_meshes(own: Setting) -> list[Coarser]:
     half = tuple((n + 1) // 2 for n in cells)
     ratio = min(n / m for n, m in zip(cells, half, strict=True))
     elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
-    near = ratio**CORNER if plate else ratio ** max(2, 2 * k - 1)
-    fewer = [Coarser(replace(own, elements=elements), ratio ** max(2, k), near)] if ratio >= LONGER else []
-    return [*fewer, *degrees]
+    orders = (max(2, k), CORNER if plate else max(2, 2 * k - 1), 2 * k)
+    fewer = [Coarser(replace(own, elements=elements), *(ratio**p for p in orders))] if ratio >= LONGER else []
+    return [*fewer, *(degrees if plate else degrees[::-1])]
 
 
 def coarser(own: Setting, end: float) -> list[Coarser]:
@@ -134,7 +152,7 @@ def coarser(own: Setting, end: float) -> list[Coarser]:
         return meshes
     pairs = [(mesh, in_longer_steps(mesh.setting, end)) for mesh in meshes]
     return [
-        Coarser(steps.setting, min(steps.far, mesh.far), min(steps.near, mesh.near))
+        Coarser(steps.setting, min(steps.far, mesh.far), min(steps.near, mesh.near), max(steps.most, mesh.most))
         for mesh, steps in pairs
         if steps is not None
     ]
@@ -151,11 +169,13 @@ def by_order(apart: float, before: float | None, other: Coarser) -> float:
     if before is None:
         unseen = other.setting.moving or apart > ASYMPTOTIC
         return apart / (min(2.0 if unseen else math.inf, other.far, other.near) - 1.0)
-    if apart == 0.0:
+    least, largest, cells = max(apart, before / other.most), max(apart, before), other.setting.elements
+    if least == 0.0:
         return 0.0
-    largest = max(apart, before)
-    q = min(other.far if largest > ASYMPTOTIC else other.near, before / apart)
-    return min(apart / (q - 1.0), largest) if q > 1.0 else largest
+    q = min(other.far if largest > ASYMPTOTIC else other.near, before / least)
+    if isinstance(cells, int) and cells < FEW and apart <= ASYMPTOTIC and not other.setting.moving:
+        q = max(q, other.far)
+    return min(least / (q - 1.0), largest) if q > 1.0 else largest
 
 
 def finer(own: Setting) -> Setting:
@@ -232,8 +252,10 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     for name, others in ways.items():
         answers.times = rows
         found = _compare(out, name, answers, own, others)
-    if (lost := own.outcome.round_off) is not None:
-        out.parts["round_off"] = lost
+    if (lost := own.outcome.round_off) is not None:  # a bound; that of another mesh is independent, so d shows it
+        out.parts["round_off"] = min([lost, *(r["error"] for r in out.rows[:1])])
+    if (chords := own.outcome.chords) > 0.0:
+        out.parts["geometry"] = chords
     if not registry.theories[setting.theory].exact:
         out.parts["model"] = of_theory(out, answers, own, found or own)
     return out
@@ -253,17 +275,18 @@ def _compare(
     if not math.isfinite(apart.size):
         out.unknown.append("nothing moves, where it does with a coarser setting")
         return answer
-    kinks = name != "space" and _as_many_steps(own, answer)
+    kinks = _as_many_steps(name, own, answer)
     if kinks and own.setting.tolerance is None:
         out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
         return answer
     halved = answer.setting.degree == own.setting.degree
     before: Distance | None = None
     if halved and (other.near > 2.0 or apart.size > ASYMPTOTIC):
-        third, _ = _next(answers, answer, others(answer.setting)[:1])
-        if third is not None and third[0].setting.degree == own.setting.degree and not _as_many_steps(answer, third[0]):
-            output = answer.output
-            output = replace(output, count=None) if isinstance(output, Spectrum) else output  # to which others are near
+        coarsest = [c for c in others(answer.setting)[:1] if c.setting.degree == own.setting.degree]
+        third, _ = _next(answers, answer, coarsest)
+        if third is not None and not _as_many_steps(name, answer, third[0]):
+            output = answer.output  # of modes with those that are no partner by their order
+            output = replace(output, count=None) if isinstance(output, Spectrum) else output
             before = output.apart(third[0].output)
     if isinstance(own.output, Spectrum):
         last = [None] * len(apart.each) if before is None else before.each[apart.partners]
@@ -287,7 +310,7 @@ def _compare(
 def _next(answers: Answers, own: Answer, others: list[Coarser]) -> tuple[tuple[Answer, Coarser] | None, str]:
     """Return the first of coarser answers that there is, with its setting; None and why without one.
 
-    Of fixed steps it has every second row, where longer steps end, too; of modes also those beyond the ones wanted.
+    Of fixed steps it has every second row, where longer steps end, too.
     """
     why = "there are too few steps to take steps of twice the length"
     if own.setting.step is not None and answers.times is not None:
@@ -300,9 +323,9 @@ def _next(answers: Answers, own: Answer, others: list[Coarser]) -> tuple[tuple[A
     return None, why
 
 
-def _as_many_steps(own: Answer, other: Answer) -> bool:
-    """Return whether another answer of a history has too many steps for longer ones."""
-    return own.outcome.steps > 0 and other.outcome.steps > FEWER * own.outcome.steps
+def _as_many_steps(name: str, own: Answer, other: Answer) -> bool:
+    """Return whether another answer, that is to show an error by the steps, has too many for longer ones."""
+    return name != "space" and own.outcome.steps > 0 and other.outcome.steps > FEWER * own.outcome.steps
 
 
 def has_longer_cells(own: Answer, other: Answer) -> bool:
@@ -381,13 +404,12 @@ def error_line(summary: Mapping[str, Any]) -> str:
 
 def table_lines(rows: list[dict[str, Any]]) -> list[str]:
     """Return the table of settings as lines."""
-    cells = [("setting", "error", "CPU s")] if rows else []
+    cells = []
     for r in rows:
         about, size = "≈ " if r.get("extrapolated") else "", _known(r.get("error"))
         error = r.get("failed", "–" if size is None else f"{about}{size:.1e}" if size > FLOOR else f"< {FLOOR:.0e}")
         cells.append((r["words"], error, f"{about}{r['seconds']:.2g}"))
-    wide = [max((len(line[i]) for line in cells), default=0) for i in range(3)]
-    return [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells]
+    return ShortTable(("setting", "error", "CPU s"), cells).lines(LINE) if cells else []
 
 
 def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
@@ -397,6 +419,9 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
     if model > OUT_OF_RANGE:
         how = "out of its range" if model >= 1.0 else f"in error by about {100 * model:.2g} %"
         said.append(f'model.theory = "{own.theory}" is {how} here; "{exact_theory(scene)}" is exact')
+    chords = errors.parts.get("geometry") or 0.0
+    if chords > max(NOTICED, own.tolerance or 0.0):
+        said.append(f"the mesh has straight edges along curves: {percent(chords)} in frequencies; {ORDER_2}")
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
     if rest > max(NOTICED, own.tolerance or 0.0) and not errors.each:
         what, of = ("tip", " of its largest displacement") if own.moving else ("result", "")

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers
-from rotfem.accuracy.errors import WORDS, Errors, estimate, warnings_of
+from rotfem.accuracy.errors import ORDER_2, WORDS, Errors, estimate, warnings_of
 from rotfem.accuracy.ladder import Clock, Walk, walk
 from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, InputError, Stopped
@@ -21,10 +21,6 @@ R = TypeVar("R", bound=Result)
 
 #: What `accuracy_of` calls the moment at the root.
 ROOT_MOMENT = "root_moment"
-
-
-class Missed(ComputationError):
-    """No setting was found that meets the accuracy."""
 
 
 def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
@@ -106,13 +102,14 @@ def to_accuracy(answers: Answers, of: str, clock: Clock, comm: MPI.Comm, finish:
     raise missed
 
 
-def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> Missed:
+def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> ComputationError:
     """Return the error that says what the best answer reached instead of an accuracy, and what failed after it."""
     known = {name: part for name, part in errors.parts.items() if part is not None}
     unknown = [WORDS[name] for name in errors.parts if name not in known]
     worst = max(known, key=lambda name: known[name], default="discretisation")
     advice = {
         "model": f"a looser accuracy, or a richer model.theory than {scene.model.theory}",
+        "geometry": f"a looser accuracy, or a mesh whose {ORDER_2}",
         "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }.get(worst, "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""))
     if unknown:
@@ -121,4 +118,4 @@ def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> M
         reached = f"an error of {errors.total:.2g} was reached, most of it ({WORDS[worst]}) {known[worst]:.2g}"
     why = "" if failure is None else f", and a further attempt failed: {failure.what}"
     what = f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}"
-    return Missed(what, advice=(failure.advice if failure is not None else None) or advice)
+    return ComputationError(what, advice=(failure.advice if failure is not None else None) or advice)

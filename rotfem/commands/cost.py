@@ -35,7 +35,6 @@ from rotfem.listeners import Progress
 from rotfem.mechanics.theories import theories as all_theories
 from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.distance import Spectrum
-from rotfem.results.files import json_text
 from rotfem.results.result import Row, Rows
 from rotfem.scene import Scene, as_scene
 from rotfem.units import seconds_of
@@ -117,6 +116,7 @@ def cost(
 
     def result(status: str) -> CostResult:
         rows, known, reference = study.rows(), study.known, study.reference
+        able = [row for row in rows if row["theory"] in named]
         found: dict[str, Any] = {
             **summary("cost", scene, comm),
             "status": status,
@@ -126,7 +126,8 @@ def cost(
             "reference": None if reference is None else reference.setting.words(),
             "uncertainty": known if math.isfinite(known) else None,
             "model_errors": least(rows),
-            **recommendations([row for row in rows if row["theory"] in named], accuracy, known),
+            "recommended": recommend(able, accuracy, known),
+            "closest": nearest(able, accuracy, known),
             "settings": len(rows),
             "failed": sum(row["status"] == "failed" for row in rows),
             "budget": {"seconds": seconds, "used": clock.used(), "refused": study.refused},
@@ -403,18 +404,10 @@ def recommend(rows: Iterable[Row], accuracy: float, known: float = 0.0) -> Row |
     return next((row for row in pareto(rows) if bound(row, known) <= accuracy), None)
 
 
-def recommendations(rows: list[Row], accuracy: float, known: float) -> dict[str, Any]:
-    """Return what a summary says of the settings to take.
-
-    `recommended` is the row for the accuracy, `closest` the row with the least bound where there is none, with that,
-    and `recommendations` are the rows for powers of ten, too.
-    """
-    wanted = sorted({1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, accuracy}, reverse=True)
-    best = {a: recommend(rows, a, known) for a in wanted}
-    nearest = min(pareto(rows), key=lambda row: bound(row, known), default=None)
-    closest = None if nearest is None or best[accuracy] else {"within": bound(nearest, known), "row": nearest}
-    listed = [{"accuracy": a, "setting": r and r["words"], "row": r} for a, r in best.items()]
-    return {"recommended": best[accuracy], "closest": closest, "recommendations": listed}
+def nearest(rows: list[Row], accuracy: float, known: float) -> dict[str, Any] | None:
+    """Return the row with the least bound, and that, where no row is within an accuracy."""
+    row = min(pareto(rows), key=lambda row: bound(row, known), default=None)
+    return None if row is None or bound(row, known) <= accuracy else {"within": bound(row, known), "row": row}
 
 
 @dataclass(repr=False)
@@ -482,19 +475,12 @@ class CostResult(Rows):
         """Return the rows with numbers of elements as text where they are two."""
         return [{k: "x".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in self.rows]
 
-    def texts(self) -> dict[str, str]:
-        """Return cost.csv and cost.json."""
-        keys = ("output", "reference", "uncertainty", "model_errors", "recommended", "recommendations")
-        return {**super().texts(), "cost.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows})}
-
 
 def changes_of(scene: Scene, row: Mapping[str, Any]) -> dict[str, Any]:
     """Return the scene's keys ↦ values of the setting of a row; rows of a history stay as far apart."""
     names = ("theory", "elements", "degree", "scheme", "step", "tolerance")
-    out, time = Setting.read({name: row[name] for name in names if row[name] is not None}).changes(), scene.time
-    out |= dict.fromkeys(("accuracy", "accuracy_budget"))
-    if time is not None and row["scheme"] is not None:
-        out |= {f"time.{name}": None for name in time.parameters if row["scheme"] != time.scheme}
+    out = Setting.read({name: row[name] for name in names if row[name] is not None}).changes(scene)
+    if (time := scene.time) is not None and row["scheme"] is not None:
         spacing = time.output_step or (time.step and time.step * time.output_every)
         out |= {"time.output_every": None, "time.min_step": None, "time.output_step": spacing}
     return out

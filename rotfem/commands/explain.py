@@ -212,10 +212,11 @@ class Explanation:
         self.system = self._switched(problem)
         degree = self.system.V.element.basix_element.degree  # a default differs by cell
         self.own = replace(Setting.of(scene), degree=degree, effects=problem.effective_effects())
-        self.turning, self.absent = self._turning(), self._absent()
+        self.absent, hub = self._absent(), problem.motion.hub
         self.speed = problem.motion.final_speed(0.0 if scene.time is None else scene.time.end)
-        if problem.motion.hub is not None and scene.time is not None:
-            self.speed = max(self.turning[0], key=abs)
+        if hub is not None and scene.time is not None:  # the largest of the rigid structure
+            times = np.unique([*np.linspace(0.0, scene.time.end, 401), *hub.torque.knots])
+            self.speed = max(hub.rigid_speeds(times, self.system.row.rest_inertia()), key=abs)
         compute: dict[str, Any] = {HISTORY: self._history, STEADY: self._steady, MODES: self._modes}
         self.answers = {
             name: Answers(scene, of, moving=name == HISTORY)
@@ -239,16 +240,6 @@ class Explanation:
         except InputError as error:
             out[STEADY] = str(error)
         return out
-
-    def _turning(self) -> tuple[Array, Array]:
-        """Return Ω and dΩ/dt at some times of the motion; of a free hub those of the rigid structure."""
-        motion, end = self.problem.motion, 0.0 if self.scene.time is None else self.scene.time.end
-        times = np.linspace(0.0, max(end, motion.settled), 401)
-        if motion.hub is None:
-            return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-        times = np.unique([*times, *motion.hub.torque.knots])
-        speeds = motion.hub.rigid_speeds(times, self.system.row.rest_inertia())
-        return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
 
     # --- the outputs of a model -------------------------------------------------------------------------------------
 

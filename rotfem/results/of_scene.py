@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import ZERO, Columns, ShortTable, number, numbers, per_cent
-from rotfem.results.files import json_text
 from rotfem.results.result import Array, Result, Row, Rows
 from rotfem.results.surfaces import Surface
 
@@ -176,11 +175,6 @@ class ExplainResult(Rows):
     def outputs(self) -> list[str]:
         """Names of the outputs whose changes were estimated."""
         return list(self.summary["outputs"])
-
-    def texts(self) -> dict[str, str]:
-        """Return explain.json."""
-        explained = {name: self.summary[name] for name in ("outputs", "resolution")} | {"rows": self.rows}
-        return {"explain.json": json_text(explained)}
 
     def tables(self) -> list[ShortTable]:
         """Return how much every effect and theory changes the outputs."""

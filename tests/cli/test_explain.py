@@ -38,18 +38,18 @@ def test_explain_prints_a_row_each(folder: Path, rotfem: Rotfem) -> None:
         assert name in done.out
     assert "gravity (no gravity)" in done.out
     assert {f.name for f in (folder / "results" / "beam" / "explain").iterdir()} == {
-        "explain.json",
+        "explain.csv",
         "explain.png",
         "summary.json",
     }
 
 
-def test_rows_are_in_json_and_in_the_file(folder: Path, rotfem: Rotfem) -> None:
+def test_rows_are_in_json_and_in_a_file(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("explain", "beam.toml", "--json", "--no-plots", "-o", "out")
     assert done.status == 0, done.err
     summary = json.loads(done.out)
     assert summary["outputs"] == ["steady", "modes"]
-    assert json.loads((folder / "out" / "explain.json").read_text())["rows"] == summary["rows"]
+    assert len((folder / "out" / "explain.csv").read_text().splitlines()) == 1 + len(summary["rows"])
     assert not (folder / "out" / "explain.png").exists()
     assert rotfem("explain", "beam.toml", "-q", "--no-plots", "-o", "out") == (0, "", "")
 

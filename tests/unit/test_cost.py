@@ -13,7 +13,6 @@ from mpi4py import MPI
 from rotfem.accuracy.answer import Answers
 from rotfem.accuracy.ladder import Clock
 from rotfem.accuracy.tuned import write_variant
-from rotfem.commands.advice import advise
 from rotfem.commands.cost import Study, pareto, recommend
 from rotfem.commands.explain import Output
 from rotfem.errors import SceneError
@@ -96,16 +95,3 @@ def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Any) -> None:
     law = Scene.from_dict(BEAM | {"motion": {"type": "callable", "speed": lambda t: 1.0}})
     with pytest.raises(SceneError, match="Python function"):
         write_variant(law, {}, tmp_path / "t.toml", "")
-
-
-def test_advice_is_given_where_it_is_due() -> None:
-    def said(changes: dict[str, Any], **more: float) -> list[str]:
-        lines: list[str] = []
-        assert advise(Scene.from_dict(BEAM).replace(changes), lines.append, **more) == lines
-        return lines
-
-    assert said({}) == []
-    (theory,) = said({"model.theory": "linear"}, critical=3.8)
-    assert "3.8 rad/s" in theory
-    assert said({"model.theory": "linear", "motion.speed": 3.0}, critical=3.8) == []
-    assert advise(Scene.from_dict(BEAM).replace({"model.theory": "linear"}), None, critical=3.8) == []

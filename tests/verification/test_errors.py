@@ -62,7 +62,7 @@ def test_the_error_of_adaptive_steps_is_bounded(tolerance: float) -> None:
         ({**BEAM, "tip_mass": 3.0}, PULSE),
         (
             {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0},
-            {"pressure": [[0, 0], [0.05, 50.0], [0.1, 0]]},
+            {"pressure": {"over_time": [[0, 0], [0.05, 50.0], [0.1, 0]]}},
         ),
     ],
 )

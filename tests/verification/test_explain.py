@@ -23,9 +23,6 @@ from tests.beams import STRUCTURE
 
 pytestmark = pytest.mark.estimated
 
-#: Part of the spin-up, with steps that are seen.
-COARSE_STEPS = {"motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0}, "time": {"end": 6.0, "step": 0.04}}
-
 SPIN_UP: dict[str, Any] = {
     "structure": STRUCTURE,
     "motion": {"type": "spin_up", "speed": 4.0, "duration": 4.0},
@@ -161,21 +158,36 @@ def test_rows_of_a_blade_whose_hinge_nothing_holds() -> None:
         assert {name for name, change in rows.items() if change > 0.03} == changed
 
 
-def test_rows_are_the_distances_of_two_runs() -> None:
-    """Of histories and of modes, and none above 1 % is called negligible."""
-    own, result = scene(SPIN_UP), rotfem.explain(SPIN_UP)
-    for row in (row for row in result.rows if row["name"] != "linear"):  # which diverges
+FORCE = {"tip_force": {"over_time": [[0, 0, 0], [0.5, 0, 30.0], [2.0, 0, 0]], "kind": "follower"}}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"motion": {"type": "spin_up", "speed": 4.0, "duration": 4.0}, "time.end": 5.0},
+        {"initial": {"state": "steady", "mode": 1, "amplitude": 0.1}},
+        {"initial": {"tip_displacement": 0.5}},
+        {"loads": FORCE},
+        {"loads": {"gravity": [0.0, -9.81]}},
+    ],
+    ids=["spin-up", "mode", "released", "follower", "gravity that turns"],
+)
+def test_rows_are_the_distances_of_two_runs(changes: dict[str, Any]) -> None:
+    """Of histories, of starts and loads, and of modes; none above 1 % is called negligible."""
+    still = {"motion": {"type": "constant", "speed": 2.0}, "mesh.elements": 4, "time.end": 2.0, "output.error": False}
+    own = scene(SPIN_UP, {**still, **changes})
+    result = rotfem.explain(own)
+    for row in (row for row in result.rows if row["worst"] < np.inf):
         kept = [name for name in result.summary["effects"] if name != row["name"]]
-        changes = {"model.effects": kept} if row["kind"] == "effect" else {"model.theory": row["name"]}
-        changes["output.error"] = False
-        true = {HISTORY: distance(tip(rotfem.run(own)), tip(rotfem.run(own.replace(changes))))}
-        one, other = (rotfem.modes(asked).frequencies for asked in (own, own.replace(changes)))
-        true[MODES] = float(np.max(np.abs(other / one - 1.0)))
+        other = own.replace({"model.effects": kept} if row["kind"] == "effect" else {"model.theory": row["name"]})
+        true = {HISTORY: distance(tip(rotfem.run(own)), tip(rotfem.run(other)))}
+        if "loads" not in changes:
+            one, two = (rotfem.modes(asked).frequencies for asked in (own, other))
+            true[MODES] = float(np.max(np.abs(two / one - 1.0)))
         for name, truth in true.items():
-            assert truth / 3 - 1e-8 <= row["estimate"][name] <= 3 * truth + 1e-8, (row["name"], name)
+            assert truth / 3 - 1e-6 <= row["estimate"][name] <= 3 * truth + 1e-6, (row["name"], name)
         if max(true.values()) > NOTICEABLE:
             assert row["verdict"] != "negligible"
-    assert {name for name, verdict in result.verdicts.items() if verdict == "large"} >= {"euler"}
 
 
 def test_change_by_a_theory_is_that_of_spectral_histories() -> None:
@@ -229,38 +241,6 @@ def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
             assert rough["estimate"][MODES] == pytest.approx(fine["estimate"][MODES], rel=0.1, abs=2e-4), rough["name"]
 
 
-@pytest.mark.parametrize(
-    "initial", [{"state": "steady", "mode": 1, "amplitude": 0.1}, {"tip_displacement": 0.5}], ids=["mode", "released"]
-)
-def test_an_explanation_starts_as_its_scene_does(initial: dict[str, Any]) -> None:
-    """All that moves does since the start: without the spin nothing else of it would be there to be compared."""
-    tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 3.0}, "mesh": {"elements": 4}}
-    own = Scene.from_dict({**tables, "initial": initial, "time": {"end": 1.5, "step": 0.01}})
-    true = distance(
-        *(tip(rotfem.run(own.replace(left))) for left in ({}, {"model.effects": ["coriolis", "rotary_inertia"]}))
-    )
-    assert rows_of(own)["centrifugal"]["estimate"][HISTORY] == pytest.approx(true, rel=0.2)
-
-
-@pytest.mark.parametrize(
-    "loads",
-    [
-        {"tip_force": {"over_time": [[0, 0, 0], [0.5, 0, 30.0], [2.0, 0, 0]], "kind": "follower"}},
-        {"gravity": [0.0, -9.81]},
-    ],
-    ids=["follower", "gravity that turns"],
-)
-def test_an_explanation_takes_the_loads_of_a_run(loads: dict[str, Any]) -> None:
-    """Within a factor of 2: the explanation takes several steps of the scene as one."""
-    tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 2.0}, "mesh": {"elements": 4}}
-    own = Scene.from_dict({**tables, "loads": loads, "time": {"end": 2.0, "step": 0.01}})
-    rows, full, effects = rows_of(own), tip(rotfem.run(own)), Problem.of(own).effective_effects()
-    for name in set(effects) - {"rotary_inertia"}:
-        kept = [other for other in effects if other != name]
-        true = distance(full, tip(rotfem.run(own.replace({"model.effects": kept}))))
-        assert true / 2 < rows[name]["estimate"][HISTORY] < 2 * true, name
-
-
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
     """A torque M for T seconds on I_R + ρ L³/3 about the axis."""
     motion = {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.0, 2.0, 300.0], [2.0, 3.0, -600.0]]}
@@ -301,7 +281,7 @@ def test_change_by_damping_that_long_steps_hide() -> None:
             "structure": {**beam, "damping": {"rayleigh": [0.5, 5e-5]}},
             "motion": {"type": "constant", "speed": 4.0},
             "model": {"theory": "consistent_linear"},
-            "loads": {"distributed": gusts},
+            "loads": {"distributed": {"over_time": gusts}},
             "initial": {"state": "undeformed"},
             "mesh": {"elements": 2},
             "time": {"end": 12.0, "step": 0.03},
@@ -352,7 +332,7 @@ def test_an_own_model_that_fails_is_reported() -> None:
     coriolis = next(line for line in report(result) if line.startswith("without coriolis"))
     assert coriolis.split()[2] == "inf"
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
-    assert '"estimate"' in result.texts()["explain.json"]
+    assert "estimate_modes" in result.texts()["explain.csv"]
     result.drawings()["explain.png"]()
 
 
