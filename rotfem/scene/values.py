@@ -105,6 +105,23 @@ def check_start(rows: Any) -> Any:
     return rows
 
 
+#: Rows nearer than this part of the last x are a step: with a ramp so short no answer differs by more.
+STEEP = 1e-6
+
+
+def check_steps(rows: Any) -> Any:
+    """Return a profile with steps in the place of ramps that no mesh has nodes for."""
+    if isinstance(rows, float):
+        return rows
+    out = [rows[0]]
+    for x, value in rows[1:]:
+        steep = x - out[-1][0] <= STEEP * rows[-1][0]
+        if steep and len(out) > 1:
+            out[-1] = (x, out[-1][1])
+        out.append((out[0][0] if steep and len(out) == 1 else x, value))
+    return tuple(out)
+
+
 #: A number, or rows of x and numbers in any order, in the scene or in a file.
 Span = Annotated[
     Annotated[T, Tag("<one>")] | Annotated[tuple[tuple[Number, T], ...], Tag("<rows>")], BY_SHAPE, FROM_FILE
@@ -112,7 +129,7 @@ Span = Annotated[
 #: A number, or a taper ((x, value), …), x (m) strictly increasing.
 Tapered = Annotated[Span[T], AfterValidator(check_increasing)]
 #: A number, or a taper from x = 0, in which two rows of one x are a step.
-Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start)]
+Profile = Annotated[Span[T], AfterValidator(check_span), AfterValidator(check_start), AfterValidator(check_steps)]
 #: Rows (t, value), t (s) increasing.
 TimeTable = Annotated[tuple[tuple[Number, Number], ...], FROM_FILE, AfterValidator(check_times)]
 

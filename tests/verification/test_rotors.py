@@ -531,7 +531,10 @@ def test_stiff_tension_takes_no_digits() -> None:
 
 
 def test_steps_are_two_rows_of_one_x() -> None:
-    """A bore that begins inside and a larger diameter: as two short ramps, 1e-5, the length of the ramps."""
+    """A bore that begins inside and a larger diameter: as two short ramps, 1e-4, of which the error is the mesh's.
+
+    Ramps of at most 1e-6 of the length, which no mesh has nodes for, are steps.
+    """
     motion = {"type": "constant", "speed": 100.0, "axis": [1, 0, 0]}
 
     def frequencies(ramp: float) -> np.ndarray:
@@ -542,7 +545,8 @@ def test_steps_are_two_rows_of_one_x() -> None:
         structure = {"type": "spatial_beam", "length": 1.0, "root": {"driven": True}, "supports": supports}
         return rotfem.modes({"structure": structure | {"section": section}, "motion": motion}).frequencies
 
-    np.testing.assert_allclose(frequencies(0.0), frequencies(1e-6), rtol=1e-5)
+    np.testing.assert_allclose(frequencies(0.0), frequencies(2e-6), rtol=1e-4)
+    np.testing.assert_allclose(frequencies(0.0), frequencies(3e-7), rtol=2e-6)
 
 
 def test_internal_damping_turns_with_the_shaft() -> None:
