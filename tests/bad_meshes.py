@@ -93,7 +93,7 @@ BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
     "mixed cells": (mixed, 'its physical group "plate" mixes cells'),
     "cell without area": (no_area, "has no area"),
     "folded cell": (folded, "corner of 180° or more"),
-    "solid": (solid, "dimension 3"),
+    "solid": (solid, "no physical surface"),
     "out of the plane": (curved, "leaves the plane"),
     "not a mesh": (rubbish, "structure.mesh"),
     "missing": (None, "file not found"),

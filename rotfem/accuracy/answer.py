@@ -140,6 +140,10 @@ class Outcome(Protocol):
         """Coordinates (m) of all vertices of the mesh along each axis."""
 
     @property
+    def chords(self) -> float:
+        """Error by straight edges along curves, relative; 0 without (see `rotfem.accuracy.outputs`)."""
+
+    @property
     def round_off(self) -> float | None:
         """Bound of the error by round-off, relative; None where none is known."""
 

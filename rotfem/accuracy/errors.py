@@ -82,7 +82,11 @@ WORDS = {
     "model": "theory",
     "effects": "effects left out",
     "round_off": "round-off",
+    "geometry": "straight edges along curves",
 }
+
+#: What is better where a mesh has straight edges along curves.
+ORDER_2 = "cells of order 2 follow them (gmsh: Mesh.ElementOrder = 2)"
 
 # --- the coarser answer -----------------------------------------------------------------------------------------------
 
@@ -250,6 +254,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
         found = _compare(out, name, answers, own, others)
     if (lost := own.outcome.round_off) is not None:  # a bound; that of another mesh is independent, so d shows it
         out.parts["round_off"] = min([lost, *(r["error"] for r in out.rows[:1])])
+    if (chords := own.outcome.chords) > 0.0:
+        out.parts["geometry"] = chords
     if not registry.theories[setting.theory].exact:
         out.parts["model"] = of_theory(out, answers, own, found or own)
     return out
@@ -413,6 +419,9 @@ def warnings_of(errors: Errors, own: Setting, scene: Scene) -> list[str]:
     if model > OUT_OF_RANGE:
         how = "out of its range" if model >= 1.0 else f"in error by about {100 * model:.2g} %"
         said.append(f'model.theory = "{own.theory}" is {how} here; "{exact_theory(scene)}" is exact')
+    chords = errors.parts.get("geometry") or 0.0
+    if chords > max(NOTICED, own.tolerance or 0.0):
+        said.append(f"the mesh has straight edges along curves: {percent(chords)} in frequencies; {ORDER_2}")
     rest = sum(errors.parts.get(name) or 0.0 for name in ("discretisation", "time", "space"))
     if rest > max(NOTICED, own.tolerance or 0.0) and not errors.each:
         what, of = ("tip", " of its largest displacement") if own.moving else ("result", "")

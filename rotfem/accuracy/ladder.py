@@ -282,6 +282,8 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
                 break
             at = {name: rung + 1 for name, rung in at.items()}
             continue
+        if before is None and (chords := answer.outcome.chords) > 0.0:
+            model.parts["geometry"] = chords
         if before is None and not registry.theories[setting.theory].exact:
             model.parts["model"] = of_theory(model, answers, answer, answer)
         errors = Errors({}, list(model.unknown), answer.output.scale)
@@ -308,7 +310,8 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
             errors.parts["round_off"] = lost if before is None else min(lost, there.size)  # see `errors.estimate`
         found.keep(answer, errors, accuracy)
         following = max(at.values()) + 1
-        if found.met or (model.parts.get("model") or 0.0) > accuracy:
+        curved = error is not None and (model.parts.get("geometry") or 0.0) > accuracy  # no degree lessens that
+        if found.met or curved or (model.parts.get("model") or 0.0) > accuracy:
             break
         before, refine = (at, answer), [name for name in at if EVEN * parts[name] >= max(parts.values())]
         at = {name: rung + (name in refine) for name, rung in at.items()}

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
 from rotfem.accuracy.errors import Errors, estimate
-from rotfem.accuracy.outputs import lines
+from rotfem.accuracy.outputs import chords, lines
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Spectrum, sizes
@@ -60,6 +60,11 @@ class Modes:
     def lines(self) -> list[Array]:
         """Coordinates (m) of the vertices along each axis."""
         return lines(self.analysis.system)
+
+    @property
+    def chords(self) -> float:
+        """Error by straight edges along curves."""
+        return chords(self.analysis.system)
 
     def result(self) -> Modes:
         """Return this, of which the commands make their results."""

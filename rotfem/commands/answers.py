@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers
-from rotfem.accuracy.errors import WORDS, Errors, estimate, warnings_of
+from rotfem.accuracy.errors import ORDER_2, WORDS, Errors, estimate, warnings_of
 from rotfem.accuracy.ladder import Clock, Walk, walk
 from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, InputError, Stopped
@@ -109,6 +109,7 @@ def _missed(scene: Scene, errors: Errors, failure: ComputationError | None) -> C
     worst = max(known, key=lambda name: known[name], default="discretisation")
     advice = {
         "model": f"a looser accuracy, or a richer model.theory than {scene.model.theory}",
+        "geometry": f"a looser accuracy, or a mesh whose {ORDER_2}",
         "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }.get(worst, "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""))
     if unknown:

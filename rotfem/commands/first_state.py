@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -90,8 +91,11 @@ def _equilibrium(scene: Scene, problem: Problem, system: System, judged: bool) -
         start.stability = stability_of(whole, start.q if whole is system else found(whole, []), speed)
     except ComputationError as error:
         raise ComputationError(f"no equilibrium to start from: {error.what}", advice=WITHOUT) from error
-    said = start.stability.warning()
-    if start.stability.stable is False:
+    said, growth = start.stability.warning(), start.stability.growth
+    end = 0.0 if scene.time is None else scene.time.end
+    if said and 0.0 < growth * end < 1.0:
+        said = f"{said}; by a factor of {math.exp(growth * end):.4g} in the {end:g} s of the history"
+    elif start.stability.stable is False:
         raise ComputationError(f"the history would start from an {said}", advice=WITHOUT)
     if said:
         start.warnings.append(f"what the history starts from: {said}")

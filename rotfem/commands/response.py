@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.accuracy.errors import OUT_OF_RANGE
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.frequency_response import (
     FrequencyResponse,
@@ -222,7 +223,7 @@ def result_of(
     stability, said = remarks(spinning, modes)
     held = beyond(analysis.problem, [spinning.speed])
     warnings = [*frozen_in_frame(analysis.problem), *held, *said, *doubtful(modes)]
-    warnings += [no_damping(modes, undamped)] if undamped else []
+    warnings += [no_damping(modes, undamped)] if undamped else too_large(analysis, outputs, direct)
     if scene.accuracy is not None:
         warnings.append(
             f"accuracy = {scene.accuracy:g} is not pursued: a frequency response is of the scene's own model and mesh"
@@ -242,6 +243,21 @@ def result_of(
         "advice": [],
     }
     return ResponseResult(summary, rows, direct)
+
+
+def too_large(analysis: ModalAnalysis, outputs: Sequence[str], direct: Array) -> list[str]:
+    """Return the warning of amplitudes θ beyond linear theory, whose relative error is about ½ θ²."""
+    length = analysis.structure.length
+    tip = [j for j, name in enumerate(outputs) if name.startswith("tip_")]
+    turns = {outputs[j]: np.max(np.abs(direct[:, j])) / (length if "_u" in outputs[j] else 1.0) for j in tip}
+    worst = max(turns, key=lambda name: turns[name], default="")
+    if not worst or turns[worst] ** 2 / 2 <= OUT_OF_RANGE:
+        return []
+    how = f"{turns[worst]:.2g} of the length" if "_u" in worst else f"{turns[worst]:.2g} rad"
+    return [
+        f"{worst} has an amplitude of {how}: the response is linear, in error by about "
+        f"{100 * turns[worst] ** 2 / 2:.2g} % there; rotfem run takes deflections of any size"
+    ]
 
 
 def no_damping(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int]) -> str:

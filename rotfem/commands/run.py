@@ -17,7 +17,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
-from rotfem.accuracy.outputs import OUTPUTS, lines, of_columns, output_of
+from rotfem.accuracy.outputs import OUTPUTS, chords, lines, of_columns, output_of
 from rotfem.analysis.dense_output import RowTimes, multiples
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.march import March, Steps
@@ -124,6 +124,11 @@ class Simulation:
     def lines(self) -> list[Array]:
         """Coordinates (m) of the vertices of the mesh along each axis."""
         return lines(self.system)
+
+    @property
+    def chords(self) -> float:
+        """Error by straight edges along curves."""
+        return chords(self.system)
 
     def compute(self) -> Simulation:
         """Compute the rows; return this."""

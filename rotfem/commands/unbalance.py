@@ -85,7 +85,7 @@ def unbalance(
             "probes": [{"x": x, "angle": angle} for x, angle in probes],
             "operating": None if operating is None else list(operating),
             "peaks": found,
-            "warnings": [*analysis.notes, *beyond(problem, asked, asked)],
+            "warnings": [*analysis.notes, *beyond(problem, asked, asked), *undamped(problem)],
             "advice": [],
         }
         return UnbalanceResult(summary, rows, np.array([shape for shape, _, _ in answers]), response.x)
@@ -163,6 +163,14 @@ def margin(speed: float, operating: Sequence[float]) -> float:
     """Return the distance of a speed from a range in parts of the nearer end of it; 0 within it."""
     low, high = operating
     return (low - speed) / low if speed < low else (speed - high) / high if speed > high else 0.0
+
+
+def undamped(problem: Problem) -> list[str]:
+    """Return a warning if nothing takes energy from the shaft, or feeds it."""
+    parts = (*problem.structure.supports, *problem.structure.couplings)
+    if problem.structure.damping.model_fields_set or any(part.feeds for part in parts):
+        return []
+    return ["nothing damps the shaft: its peaks have no height, what is shown is round-off; give supports a damping"]
 
 
 def probe_of(text: str) -> tuple[float, float]:

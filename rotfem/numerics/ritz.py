@@ -289,5 +289,6 @@ def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float)
         done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > 400
         if done or ritz.grow(own=number >= 6) == 0:
             break
-    ritz.solve(count)
+    else:
+        ritz.solve(count)
     return ritz.values, ritz.right, ritz.left, ritz.errors

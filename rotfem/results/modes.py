@@ -214,7 +214,8 @@ class ModesResult(Rows):
             sizes = {name: float(np.max(np.abs(shape))) for name, shape in shapes.items()}
             direction = max(sizes, key=lambda name: sizes[name])
             shape = shapes[direction]
-            if sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
+            is_twist = "torsion" in mode["label"]
+            if is_twist or sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
                 continue  # torsion and stretch, and shapes with a node at the tip
             coefficients, off = fit(columns["span"], shape / shape[-1])
             number = 1 + sum(other["direction"] == direction for other in out)

@@ -107,11 +107,8 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     for name, columns in result.branches().items() if fixed else ():
         if "frequency_fixed_2" in columns:
             other = units.frequencies(columns["frequency_fixed_2"])
-            thin = style_of(name) | {
-                "lw": 0.7,
-                "label": "_" if name != branches[0].name else "smaller wave of |ω ± Ω|",
-            }
-            axis.plot(units.speeds(columns["speed"]), np.where(other <= top, other, np.nan), **thin)
+            said, other = "_" if name != branches[0].name else "smaller wave", np.where(other <= top, other, np.nan)
+            axis.plot(units.speeds(columns["speed"]), other, lw=0.7, label=said, **style_of(name))
     crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)

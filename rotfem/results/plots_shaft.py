@@ -36,10 +36,10 @@ def outline(structure: dict[str, Any]) -> tuple[Array, Array, Array]:
     section = structure.get("section", {})
 
     def profile(name: str) -> tuple[Array, Array]:
-        value = section.get(name) or 0.0
-        ends = [[0.0, value], [structure["length"], value]]
-        rows = np.array(value if isinstance(value, list) else ends if isinstance(value, float) else ends * 0)
-        return (rows[:, 0], rows[:, 1]) if len(rows) else (np.zeros(1), np.zeros(1))
+        value = section.get(name)
+        rows = value if isinstance(value, list) else [[0.0, value if isinstance(value, float) else 0.0]]
+        x, y = np.array(rows).T
+        return x, y
 
     outer = profile("radius" if section.get("radius") else "outer_radius")
     others = [profile(name) for name in ("inner_radius", "wall")]
@@ -106,11 +106,11 @@ def whirl_figure(result: ModesResult) -> Figure:
     for i, (row, shape, frequency) in enumerate(shown):
         axis: Any = figure.add_subplot(rows, columns, i + 1, projection="3d")
         nodes, style = shape["x"], style_of(row["label"])
-        names = [n for n in ("u2", "u3") if np.max(np.abs(shape[n] + 1j * shape[f"{n}_imag"])) > VISIBLE]
-        along = max(("theta1", "u1"), key=lambda n: float(np.max(np.abs(shape[n]))))
-        names = ["u2", "u3"] if names else [along]
-        y, z = ([shape[n] + 1j * shape[f"{n}_imag"] for n in names] + [np.zeros(len(nodes), complex)])[:2]
-        what = "" if names == ["u2", "u3"] else ", twist across" if names == ["theta1"] else ", stretch across"
+        y, z, twist, stretch = (shape[n] + 1j * shape[f"{n}_imag"] for n in ("u2", "u3", "theta1", "u1"))
+        what = ""
+        if max(np.max(np.abs(y)), np.max(np.abs(z))) <= VISIBLE:
+            twists = np.max(np.abs(twist)) > np.max(np.abs(stretch))
+            y, what = (twist, ", twist across") if twists else (stretch, ", stretch across")
         for a, b in ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)):
             axis.plot(x, a * thick * r, b * thick * r, color="0.7", lw=0.7)
         for at, radius, _ in disks(structure):
@@ -124,9 +124,7 @@ def whirl_figure(result: ModesResult) -> Figure:
             p, q = (np.real(part[n] * np.exp(1j * TURN)) for part in (y, z))
             axis.plot(np.full(len(p), nodes[n]), p, q, color=style["color"], lw=0.8)
             axis.plot(nodes[n : n + 1], p[:1], q[:1], "o", ms=2.5, color=style["color"])
-        axis.set(
-            ylim=(-1.0, 1.0), zlim=(-1.0, 1.0), yticks=[-1, 0, 1], zticks=[-1, 0, 1], yticklabels=[], zticklabels=[]
-        )
+        axis.set(ylim=(-1, 1), zlim=(-1, 1), yticks=(-1, 0, 1), zticks=(-1, 0, 1), yticklabels=[], zticklabels=[])
         axis.set_box_aspect((2.4, 1.0, 1.0), zoom=1.1)
         axis.tick_params(labelsize=6, pad=-2)
         axis.set_xlabel("x (m)", fontsize=7)

@@ -62,16 +62,18 @@ class ResultFolder(AbstractContextManager["ResultFolder"]):
         self.comm, self.path, self.command = comm, path, command
         self.summary: dict[str, Any] = {}
         self._growing: Table | None = None
+        self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
         self.first_does(lambda: check_own(path, inputs))
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.close(error)
 
     def close(self, error: BaseException | None = None) -> None:
-        """Say in the summary what ended the command where its results are not complete; remove an empty folder."""
-        if error is not None and not self.summary and self.comm.rank == 0:
+        """Say in the summary what ended the command where its results are not complete; remove made, empty folders."""
+        if error is not None and self.comm.rank == 0:
             with suppress(OSError):
-                self.path.rmdir()
+                for made in self._made:
+                    made.rmdir()
         if self.comm.rank == 0 and self.summary.get("status") == RUNNING:
             if self._growing is not None:
                 self._growing.flush()

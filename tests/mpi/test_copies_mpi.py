@@ -92,6 +92,5 @@ def test_speeds_are_shared_out(tmp_path: Path) -> None:
 def test_frequencies_are_shared_out(tmp_path: Path) -> None:
     _, two = summaries(tmp_path, BEAM + LOAD, "response", "--number", "9")
     assert two["shared"] == "frequencies"
-    one, other = (read_csv(tmp_path / f"r{ranks}" / "response.csv") for ranks in (1, 2))
-    for name, values in one.items():
-        np.testing.assert_array_equal(other[name], values, err_msg=name)
+    one, other = ((tmp_path / f"r{ranks}" / "response.csv").read_text() for ranks in (1, 2))
+    assert one == other

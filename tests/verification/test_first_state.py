@@ -94,7 +94,7 @@ def test_loads_over_time_and_gravity_are_frozen_at_the_start() -> None:
 def test_modes_are_about_what_a_history_starts_with() -> None:
     """Gravity across the axis and loads over time are dead loads of t = 0: the same modes at the same equilibrium."""
     tables = scene({}, model={"theory": "reissner"})
-    over_time = {"gravity": [0.0, -9.81], "distributed": [[0.0, 0.0, 20.0], [1.0, 0.0, 0.0]]}
+    over_time = {"gravity": [0.0, -9.81], "distributed": {"over_time": [[0.0, 0.0, 20.0], [1.0, 0.0, 0.0]]}}
     turning, frozen = tables | {"loads": over_time}, tables | {"loads": {"distributed": [0.0, 20.0 - 1.2 * 9.81]}}
     found = rotfem.modes(turning)
     np.testing.assert_allclose(found.frequencies, rotfem.modes(frozen).frequencies, rtol=1e-8)
@@ -161,3 +161,18 @@ def test_a_mode_that_there_is_not() -> None:
     tables = scene({"mode": 99, "amplitude": 0.1}, mesh={"elements": 1})
     with pytest.raises(rotfem.InputError, match="initial.mode = 99: must be at most"):
         rotfem.run(tables)
+
+
+def test_a_growth_that_a_history_does_not_see_is_a_warning() -> None:
+    """Beyond lateral buckling: exp(0.96 t) is a factor of 1.01 in 0.01 s, and refused over 5 s."""
+    section = {"EA": 1e6, "GA2": 1e6, "GA3": 1e6, "GJ": 0.5, "EI2": 1.0, "EI3": 1e4, "mass_per_length": 1.0}
+    section |= {"rotary_inertia2": 1e-4, "rotary_inertia3": 1e-4}
+    tables = {
+        "structure": {"type": "spatial_beam", "length": 1.0, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {"tip_force": [0.0, 2.9, 0.0]},
+        "time": {"end": 0.01, "step": 0.01},
+    }
+    assert "by a factor of 1.01 in the 0.01 s" in " ".join(rotfem.run(tables).warnings)
+    with pytest.raises(rotfem.ComputationError, match="would start from an unstable equilibrium"):
+        rotfem.run({**tables, "time": {"end": 5.0, "step": 0.01}})

@@ -176,7 +176,7 @@ def test_what_a_script_adds_is_not_known_to_be_symmetric() -> None:
 KNOWN = {
     SpatialBeamStructure: {
         *("type", "length", "hub_radius", "hub_offset", "tip_mass", "tip_inertia", "tip_offset", "masses", "section"),
-        *("pretwist", "sweep", "line", "precone", "root", "supports", "damping"),
+        *("pretwist", "sweep", "line", "precone", "root", "supports", "couplings", "damping"),
     },
     SpatialRoot: {
         *("lag_stiffness", "lag_damping", "hinge_offset", "flap_stiffness", "flap_damping", "pitch_stiffness"),

@@ -582,6 +582,27 @@ def test_a_plate_that_is_nearly_a_disk_is_said(tmp_path: Path) -> None:
     assert not any("diameter" in label for label in found.labels)
 
 
+@pytest.mark.estimated
+def test_chords_of_a_curve_are_an_error_of_their_own(tmp_path: Path) -> None:
+    """A ring of 80 to 250 mm: n straight edges around put the radii, and frequencies, off as 1/n².
+
+    The error is estimated within a half and eight times; the right frequency is extrapolated from 32 and 64.
+    """
+    found, told = [], []
+    for around in (16, 32, 64):
+        mesh = disk_mesh(tmp_path / f"{around}.msh", 0.08, 0.25, around, 3)
+        structure = {"type": "plate", "mesh": str(mesh), "thickness": 3e-3, "E": 2.05e11, "nu": 0.29, "rho": 7800.0}
+        result = rotfem.modes(
+            {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
+        )
+        found.append(result.frequencies[0])
+        told.append(result.summary["error"]["geometry"])
+    right = found[2] + (found[2] - found[1]) / 3
+    for frequency, error in zip(found[:2], told[:2], strict=True):
+        assert abs(frequency / right - 1) / 2 < error < 8 * abs(frequency / right - 1)
+    assert told[0] / told[1] == pytest.approx(4.0, rel=0.05)
+
+
 # --- films: tension outweighs the bending stiffness of a cell ---------------------------------------------------------
 
 FILM = {"type": "plate", "E": 4e9, "nu": 0.3, "rho": 1400.0}

@@ -179,3 +179,10 @@ def test_files_and_figure(swept, tmp_path):
     assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u2")
     assert len(table) == 1 + len(swept.rows)
     assert len(swept.plot().axes) == 8  # amplitudes and phases of tip u and α, of root force and moment
+
+
+def test_amplitudes_beyond_linear_theory_are_said():
+    """½ θ² of a tenth of a radian is nothing, of more than a third it is."""
+    for size, said in ((2.0, False), (200.0, True)):
+        found = response(scene(loads={"tip_force": {"harmonic": {**LOAD["harmonic"], "amplitude": [0.0, size]}}}))
+        assert any("the response is linear" in warning for warning in found.warnings) == said

@@ -138,6 +138,9 @@ def test_cones_and_shear_coefficients(tmp_path: Path) -> None:
     np.testing.assert_allclose(layered.central(0.05)["EI2"], 211e9 * I, rtol=1e-4)
 
 
+STEEL = {"E": 211e9, "G_s": 81.2e9, "rho": 7810.0}
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -149,6 +152,10 @@ def test_cones_and_shear_coefficients(tmp_path: Path) -> None:
         ({"BearingElement_a": {"n": 12, "kxx": [1.0]}}, "nothing links what is at n = 12"),
         ({"ShaftElement_a": {"n": 8}}, "ShaftElement_a.L required key is missing"),
         ({"ShaftElement_Shaft Element 3": None}, "must have one shaft"),
+        (
+            {"ShaftElement_a": {"n": 0, "L": 0.2, "idl": 0.1, "odl": 0.1, "idr": 0, "odr": 0.1, "material": STEEL}},
+            "idl < odl",
+        ),
         ({"PointMass_a": 3}, "PointMass_a"),
         ("{", "not valid JSON or TOML"),
     ],

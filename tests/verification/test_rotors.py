@@ -365,6 +365,14 @@ def test_peak_of_an_unbalance_has_its_amplification_factor() -> None:
         check(draw())
 
 
+def test_peaks_of_an_undamped_shaft_have_no_height() -> None:
+    """Which is said; of one that bearings damp it is not."""
+    for damping, said in ((0.0, True), (100.0, False)):
+        scene = shaft_on_bearings(2e4, damping, loads={"unbalance": [{"x": 0.5, "kg_m": 1e-3}]})
+        warnings = rotfem.unbalance(scene, [30.0, 50.0]).summary["warnings"]
+        assert any("nothing damps" in text for text in warnings) == said
+
+
 @pytest.mark.parametrize("theory", ["linear", "reissner"])
 def test_a_history_ends_in_the_whirl_of_its_unbalance(theory: str) -> None:
     """Bearings that differ by direction and cross-couple, an offset mass: the end of a history is the orbit, 1e-3."""
@@ -469,6 +477,45 @@ def test_spinning_shaft_on_equal_bearings() -> None:
     expected = [w * (np.sqrt(1 + x**2) + sign * x) for w, x in zip(omega, lam, strict=True) for sign in (-1, 1)]
     np.testing.assert_allclose(found.frequencies, expected, rtol=1e-3)
     assert found.summary["frame"] == "fixed"
+
+
+def test_rotor_with_three_disks_of_lalanne_and_ferraris() -> None:
+    """Rotordynamics Prediction in Engineering, 2nd edition, chapter 6: whirl at 25 000 rpm in Hz, and critical speeds.
+
+    1e-3, their 13 elements; coefficients of the bearings as k_xx, k_zz = 5e7, 7e7 N/m and 500, 700 N·s/m.
+    """
+    sizes = [(0.2, 0.24, 0.05), (0.5, 0.4, 0.05), (1.0, 0.4, 0.06)]
+    disks = [
+        {"x": x, "disk": {"outer_diameter": d, "inner_diameter": 0.1, "width": w, "rho": 7800}} for x, d, w in sizes
+    ]
+    bearing = {"stiffness": [[5e7, 0], [0, 7e7]], "damping": [[500, 0], [0, 700]]}
+    structure = {
+        "type": "spatial_beam",
+        "length": 1.3,
+        "root": {"driven": True},
+        "section": {"shape": "circle", "radius": 0.05, "E": 2e11, "nu": 0.3, "rho": 7800},
+        "supports": [{"x": x} | bearing for x in (0.0, 1.3)],
+        "masses": disks,
+    }
+    motion = {"type": "constant", "speed": "25000 rpm", "axis": [1, 0, 0]}
+    scene = {"structure": structure, "motion": motion, "modes": {"count": 8}}
+    rows = [row for row in rotfem.modes(scene).rows if "whirl" in row["label"]]
+    expected = [55.408, 67.209, 157.90, 193.71, 249.90, 407.62]
+    np.testing.assert_allclose([row["frequency_hz"] for row in rows], expected, rtol=1e-3)
+    found = rotfem.campbell(scene | {"modes": {"count": 6}}, "0:12000:5rpm", orders=0).critical_speeds
+    speeds = [c.speed for c in found if c.kind in ("backward", "forward")]
+    np.testing.assert_allclose(np.array(speeds) * 30 / np.pi, [3620.4, 3798.1, 10018.0, 11279.0], rtol=1e-3)
+
+
+def test_free_tube() -> None:
+    """Nothing holds it: six rigid motions, then pairs of bending as ROSS has them (its issue 885), 2e-4."""
+    section = {"shape": "tube", "outer_radius": 0.01504, "inner_radius": 0.0035, "E": 2.1e11, "nu": 0.3, "rho": 7850}
+    free = ["u1", "u2", "u3", "theta1", "theta2", "theta3"]
+    structure = {"type": "spatial_beam", "length": 0.3, "root": {"free": free}, "section": section}
+    motion = {"type": "constant", "speed": 0.0, "axis": [1, 0, 0]}
+    found = rotfem.modes({"structure": structure, "motion": motion, "modes": {"count": 10}}).frequencies
+    assert np.all(found[:6] < 1e-3 * found[6])
+    np.testing.assert_allclose(found[6:], [9647.0, 9647.0, 25317.0, 25317.0], rtol=2e-4)
 
 
 def test_stiff_tension_takes_no_digits() -> None:

@@ -168,6 +168,9 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     def of(kind: type[E]) -> list[E]:
         return [element for element in every.values() if isinstance(element, kind)]
 
+    for name, e in every.items():
+        if isinstance(e, ShaftElement) and not (e.idl < e.odl and e.idr < e.odr and 3 * e.material.G_s >= e.material.E):
+            deck.fail(f"{name} must have idl < odl, idr < odr and a material of G_s ≥ E/3")
     layers = dict[int, list[ShaftElement]]()
     for element in of(ShaftElement):
         layers.setdefault(element.n, []).append(element)
