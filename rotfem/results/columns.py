@@ -241,7 +241,8 @@ def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Datas
     out = out.set_coords([name for name in COORDINATES if name in out])
     for name, array in out.variables.items():
         what, unit = described(str(name))
-        what += f", {attributes['frame']} frame" * (name in ("frequency", "frequency_hz") and "frame" in attributes)
+        if name in ("frequency", "frequency_hz") and "frame" in attributes:
+            what += f", {attributes['frame']} frame"
         array.attrs |= {"long_name": what, "units": unit} if unit else {}
     return out
 

@@ -166,7 +166,8 @@ def read_table(path: Path) -> tuple[list[str], list[tuple[float, ...]]]:
         if not header and not rows and all(number_in(cell) is None for cell in cells):
             header = cells
         elif not all(map(math.isfinite, values)) or len(values) != width:
-            why = f"line {number} must be {width} finite numbers; only the first row may be a header, without any"
+            wanted = f"{width} finite number{'s' * (width > 1)}"
+            why = f"line {number} must be {wanted}; only the first row may be a header, without any"
             raise problem("", str(path), why)
         else:
             rows.append(values)

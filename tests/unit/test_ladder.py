@@ -39,6 +39,7 @@ class Made:
     steps: int = 0
     stable: bool | None = None
     round_off: float | None = None
+    chords: float = 0.0
 
     @property
     def lines(self) -> list[Any]:

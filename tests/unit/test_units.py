@@ -129,7 +129,7 @@ PURE = {
     "value",
     "table",
 }
-PURE |= {"accuracy", "increment_tolerance", "regions", "speed", "rate", "angle", "elements", "orders"}
+PURE |= {"fields", "accuracy", "increment_tolerance", "regions", "speed", "rate", "angle", "elements", "orders"}
 
 
 def tables(of: type[SceneModel] = SceneModel) -> Iterator[type[SceneModel]]:

@@ -91,5 +91,5 @@ def test_where_there_is_no_choice(changes: dict[str, str], words: str) -> None:
 def test_plates_have_membrane_forces() -> None:
     plate = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
     tables = {"structure": plate, "motion": {"type": "constant", "speed": 1.0}}
-    with pytest.raises(SceneError, match=r"model\.prestress.*membrane"):
+    with pytest.raises(SceneError, match=r"model\.prestress.*needs a beam"):
         Scene.from_dict(tables | {"model": {"theory": "consistent_linear", "prestress": "all"}})

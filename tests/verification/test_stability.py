@@ -116,8 +116,10 @@ def test_damping_that_turns_with_a_supercritical_shaft_makes_it_unstable() -> No
 def test_history_from_an_unstable_equilibrium() -> None:
     time = {"time": {"end": 0.02, "step": 0.01}}
     assert rotfem.run(beam((-300.0, 0.0), **time)).summary["stability"]["stable"] is True
+    warnings = rotfem.run(beam((-500.0, 0.0), **time)).summary["warnings"]
+    assert any("unstable equilibrium" in line and "by a factor of" in line for line in warnings)
     with pytest.raises(rotfem.ComputationError, match=r"unstable equilibrium.*initial.state = \"undeformed\""):
-        rotfem.run(beam((-500.0, 0.0), **time))
+        rotfem.run(beam((-500.0, 0.0), time={"end": 20.0, "step": 0.01}))
 
 
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])

@@ -153,7 +153,6 @@ def test_a_spatial_beam_in_a_plane_is_a_planar_one() -> None:
         ({"stations": 1}, "output.stations"),
         ({"quantities": ["M"]}, "output.quantities"),
         ({"stations": 3, "quantities": ["M2"]}, "output.quantities"),
-        ({"every": 2}, "output.every"),
     ],
 )
 def test_refused(output: dict[str, Any], key: str) -> None:
