@@ -21,7 +21,7 @@ from rotfem.errors import ComputationError, InputError
 from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Row, completed, covering
-from tests.pairs.refusals import REFUSALS, UNTRIED, Refusal
+from tests.pairs.refusals import FREE, REFUSALS, UNTRIED, Refusal
 from tests.pairs.scenes import ACTIVE, LEVELS, PLAIN, TOLERANCE, tables_of
 
 CONFLICTS = [*(refusal.choices for refusal in REFUSALS), *UNTRIED]
@@ -58,6 +58,8 @@ def test_two_processes(tmp_path: Path) -> None:
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     for number, (row, alone) in enumerate(ALONE):
+        if row["command"] == "modes" and row["root"] == "hinge" and row["motion"] in FREE:
+            continue  # three eigenvalues are zero, and round-off says which of them are the nearest ones
         with np.load(tmp_path / f"{number}.npz") as file:
             there = answers(dict(file))
         check_same(alone, there, DIGITS.get(row["time"], 1e-5), str(row))
