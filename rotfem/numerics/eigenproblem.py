@@ -45,7 +45,7 @@ from rotfem.numerics.ritz import MORE, damped_pairs, gyroscopic_pairs, heavily_d
 
 Array = npt.NDArray[Any]
 
-#: Relative bound of the error of λ above which what spoils it is looked at, which takes another factor.
+#: Relative bound of the error of λ above which it is bounded once more, by another factor.
 DIGITS_LOST = 1e-5
 
 

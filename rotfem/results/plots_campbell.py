@@ -122,7 +122,7 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
             for b in shown
             for i in np.flatnonzero(~np.isnan(b.damping))[-1:]
         ]
-        beside(panels[1], ends, NAME_HEIGHT / heights[1])
+        write_names(panels[1], ends, NAME_HEIGHT / heights[1])
     name_styles(axis, shown)
     entries = axis.get_legend_handles_labels()
     letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
@@ -161,7 +161,7 @@ def map_figure(result: CampbellResult) -> Figure:
     axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axis.set_ylim(axis.get_ylim())
-    beside(axis, ends, NAME_HEIGHT / (0.8 * 5.4))
+    write_names(axis, ends, NAME_HEIGHT / (0.8 * 5.4))
     figure.suptitle(f"{result.title}, critical speeds", fontsize=11)
     return figure
 
@@ -271,14 +271,14 @@ def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]]
     text: dict[str, Any] = {"annotation_clip": False, "fontsize": 8}
     ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
     ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
-    beside(axis, ends, NAME_HEIGHT / height)
+    write_names(axis, ends, NAME_HEIGHT / height)
     leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
     at = spread([x for _, x in leaving], 0.42 / (WIDTH - 3.0) * last, (0.0, last))  # a name is 0.42 inch wide
     for (name, _), place in zip(leaving, at, strict=True):
         axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
 
 
-def beside(axis: Axes, ends: list[End], gap: float) -> None:
+def write_names(axis: Axes, ends: list[End], gap: float) -> None:
     """Write names at the right of a panel whose limits are set, near ends of lines; gaps are in parts of its height."""
     heights = [float(axis.transAxes.inverted().transform(axis.transData.transform((x, y)))[1]) for _, x, y, _ in ends]
     for (name, x, y, color), place in zip(ends, spread(heights, gap, (0.0, 1.0)), strict=True):

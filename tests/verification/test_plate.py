@@ -588,7 +588,7 @@ def test_chords_of_a_curve_are_an_error_of_their_own(tmp_path: Path) -> None:
 
     The error is estimated within a half and eight times; the right frequency is extrapolated from 32 and 64.
     """
-    found, told = [], []
+    found, estimated = [], []
     for around in (16, 32, 64):
         mesh = disk_mesh(tmp_path / f"{around}.msh", 0.08, 0.25, around, 3)
         structure = {"type": "plate", "mesh": str(mesh), "thickness": 3e-3, "E": 2.05e11, "nu": 0.29, "rho": 7800.0}
@@ -596,11 +596,11 @@ def test_chords_of_a_curve_are_an_error_of_their_own(tmp_path: Path) -> None:
             {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
         )
         found.append(result.frequencies[0])
-        told.append(result.summary["error"]["geometry"])
+        estimated.append(result.summary["error"]["geometry"])
     right = found[2] + (found[2] - found[1]) / 3
-    for frequency, error in zip(found[:2], told[:2], strict=True):
+    for frequency, error in zip(found[:2], estimated[:2], strict=True):
         assert abs(frequency / right - 1) / 2 < error < 8 * abs(frequency / right - 1)
-    assert told[0] / told[1] == pytest.approx(4.0, rel=0.05)
+    assert estimated[0] / estimated[1] == pytest.approx(4.0, rel=0.05)
 
 
 # --- films: tension outweighs the bending stiffness of a cell ---------------------------------------------------------

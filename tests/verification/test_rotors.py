@@ -549,14 +549,19 @@ def test_steps_are_two_rows_of_one_x() -> None:
     np.testing.assert_allclose(frequencies(0.0), frequencies(3e-7), rtol=2e-6)
 
 
-def test_internal_damping_turns_with_the_shaft() -> None:
-    """Forward whirl grows from ω (1 + ζ_ext/ζ_int) on, backward whirl never: 1e-4 (Genta 2005, section 6.4)."""
+def internally_damped() -> tuple[dict[str, Any], float]:
+    """Return a shaft damped from inside and outside, and the speed (rad/s) from which its forward whirl grows."""
     eta, c = 2e-5, 20.0
     scene = shaft_on_bearings(1e9)
     scene["structure"] |= {"damping": {"kelvin_voigt": eta}}
     scene["structure"]["supports"].append({"x": 0.5, "damping": c})
     omega = np.sqrt(48.0 * EI / 10.0)
-    threshold = omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2))
+    return scene, omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2))
+
+
+def test_internal_damping_turns_with_the_shaft() -> None:
+    """Forward whirl grows from ω (1 + ζ_ext/ζ_int) on, backward whirl never: 1e-4 (Genta 2005, section 6.4)."""
+    scene, threshold = internally_damped()
     for theory in ("reissner", "consistent_linear"):
         motions = ({"type": "constant", "speed": s * threshold, "axis": [1, 0, 0]} for s in (1 - 1e-4, 1 + 1e-4))
         below, above = (rotfem.modes(scene | {"motion": m, "model": {"theory": theory}}) for m in motions)
@@ -826,14 +831,10 @@ def test_critical_speeds_of_whirls_that_are_no_branches() -> None:
 
 def test_threshold_of_internal_damping_is_found() -> None:
     """ω (1 + ζ_ext/ζ_int), from there on: 1e-3 (Genta 2005, section 6.4), with speeds far apart."""
-    eta, c = 2e-5, 20.0
-    scene = shaft_on_bearings(1e9)
-    scene["structure"] |= {"damping": {"kelvin_voigt": eta}}
-    scene["structure"]["supports"].append({"x": 0.5, "damping": c})
-    omega = np.sqrt(48.0 * EI / 10.0)
+    scene, threshold = internally_damped()
     (found,) = rotfem.campbell(scene, "0:5000:3").instabilities
     assert found.until is None
-    np.testing.assert_allclose(found.speed, omega * (1.0 + c / (2 * 10.0 * omega) / (eta * omega / 2)), rtol=1e-3)
+    np.testing.assert_allclose(found.speed, threshold, rtol=1e-3)
 
 
 def test_map_of_critical_speeds_over_the_bearings() -> None:

@@ -239,7 +239,7 @@ def format_of(deck: Deck, name: Any) -> BladeFormat:
 
 
 def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
-    """Return the keys of [structure] that a blade file stands for, with those that the scene may give beside."""
+    """Return the keys of [structure] that a blade file stands for, and those that the scene may give itself."""
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
     with problems_at("section.from", shown(path)), np.errstate(all="ignore"):
