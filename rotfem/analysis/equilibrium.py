@@ -53,8 +53,8 @@ def steady_state(
 
     Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the loads at the
     full speed on hinges, and where tension by spin is all the stiffness there is, as of a tether. The state is left in
-    the system's functions. With a `start`, the equilibrium at a nearby speed, the whole load is applied at once. `notes`
-    receives remarks on the way.
+    the functions of the system. With a `start`, the equilibrium at a speed nearby, the whole load is applied at once;
+    `notes` receives remarks on the way.
     """
     notes = [] if notes is None else notes
     loose = ", ".join(hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0)
