@@ -150,7 +150,7 @@ def test_critical_speed_of_the_linear_theory(unit_beam: Any, hub_beam: Any, spin
 
 
 def test_critical_speed_far_above_what_stiffens(spin_up: Any) -> None:
-    """The one of a beam in tension is where N⁰ = ½ m Ω² L² meets GA_s, far above 4 rad/s, where spin doubles bending."""
+    """A beam in tension loses it where N⁰ = ½ m Ω² L² meets GA_s, far above 4 rad/s, where spin doubles bending."""
     section = {"structure.section.EA": 1e11, "structure.section.GA": 3e10}
     scene = spin_up({**section, "model.theory": "consistent_linear", "mesh.elements": 60})
     found = critical_speed(ModalAnalysis(Problem.of(scene).spinning()).system)

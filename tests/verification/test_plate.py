@@ -621,6 +621,26 @@ def test_spinning_annulus(theory: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(found.frequencies[[0, 1, 3, 5]], [86.396, 108.056, 150.999, 196.177], rtol=5e-3)
 
 
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear"])
+def test_a_film_runs(theory: str, tmp_path: Path) -> None:
+    """Below the speed that is called critical no eigenvalue of the stiffness is negative, above it one is.
+
+    Without what stiffens it is the least frequency in the plane, a turn of the rim: shear waves, J1 and Y1 of k r with
+    u = 0 at 0.2 m and u' = u/r at 1 m, k = 0.59563/m.
+    """
+    mesh = disk_mesh(tmp_path / "film.msh", 0.2, 1.0, 12, 4)
+    tables = {"structure": {**FILM, "mesh": str(mesh), "thickness": 1e-3}, "model": {"theory": theory}}
+    spinning = {"motion": {"type": "constant", "speed": 100.0}, "output": {"error": False}}
+    found = rotfem.run({**tables, **spinning}).summary
+    assert found["stability"]["stable"]
+    critical = found["figures"]["critical_speed"]
+    if theory == "linear":
+        assert critical == pytest.approx(0.595631 * np.sqrt(4e9 / 2.6 / 1400.0), rel=3e-2)
+    for share in (0.999, 1.001):
+        at = {"motion": {"type": "constant", "speed": share * critical}, "output": {"error": False}}
+        assert bool(rotfem.run({**tables, **at}).summary["stability"]["negative_eigenvalues"]) == (share > 1.0)
+
+
 @pytest.mark.parametrize(("theory", "thickness"), [("consistent_linear", 1e-3), ("consistent_linear", 1e-5)])
 def test_heliogyro(theory: str, thickness: float) -> None:
     """A blade of film: bending has Ω √(n(2n − 1)), as a chain has, torsion Ω √(n(2n − 1) + 1) (MacNeal 1967)."""
