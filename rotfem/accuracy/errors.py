@@ -257,8 +257,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     if (chords := own.outcome.chords) > 0.0:
         out.parts["geometry"] = chords
     if not registry.theories[setting.theory].exact:
-        finest = found is None or found.setting.degree > setting.degree
-        out.parts["model"] = of_theory(out, answers, own, own if finest else found)
+        poor = own if found is None or found.setting.degree > setting.degree else found
+        out.parts["model"] = of_theory(out, answers, own, poor)
     return out
 
 
