@@ -327,8 +327,8 @@ def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
     torque = {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.0, 0.1, 1.0]]}
     result = modes(unit_beam(motion=torque, modes={"count": 3}))
     assert [row["mode"] for row in result.rows] == [1, 2, 3]
-    assert [row["label"] for row in result.rows] == ["rigid body", "1st edgewise", "2nd edgewise"]
-    assert list(result.shapes) == ["mode 2: 1st edgewise", "mode 3: 2nd edgewise"]
+    assert [row["label"] for row in result.rows] == ["rigid body", "1st in-plane", "2nd in-plane"]
+    assert list(result.shapes) == ["mode 2: 1st in-plane", "mode 3: 2nd in-plane"]
     assert result.draw(tmp_path)[0].is_file()
     alone = modes(unit_beam(motion=torque, modes={"count": 1}))
     assert list(alone.rows[0]) == list(result.rows[0])
