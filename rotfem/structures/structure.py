@@ -524,6 +524,14 @@ class Structure:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
 
+    def word(self, family: str) -> str:
+        """Return what a family is called in names of modes."""
+        return family
+
+    def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
+        """Return whether a shape at the nodes (n, components) is a motion of a rigid body, as far as known."""
+        return False
+
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
