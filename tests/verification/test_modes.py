@@ -16,11 +16,10 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import brentq, minimize_scalar, newton
 
-from rotfem import ComputationError, InputError, Scene, SceneError, modes
+from rotfem import ComputationError, InputError, Scene, SceneError, campbell, modes
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.stability import critical_speed
 from rotfem.analysis.state_space import state_space, write_matrices
-from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem
 from rotfem.numerics import eigenproblem as pencil
 from rotfem.numerics.linear import negative_eigenvalues, transposed
