@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -19,24 +18,12 @@ from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.results.of_scene import CheckResult
 from rotfem.results.result import Array
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 
 
-def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI.COMM_WORLD) -> CheckResult:
-    """Return what the structure of a scene is: mass, centre of mass, moments, inertias, and its properties along it.
-
-    Integrals are those of the bodies that the equations are made of, on the scene's mesh, with all mass that there is,
-    whatever effects the scene lists.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: MPI communicator; every rank gets the whole result.
-
-    Raises:
-        SceneError: the scene is not valid, or a mesh or a section that cannot be computed with.
-    """
+def weighed(scene: Scene, comm: MPI.Comm) -> CheckResult:
+    """Return mass, inertias and properties of the structure of a scene (see `rotfem.check`)."""
     started = perf_counter()
-    scene = as_scene(scene)
     with input_of(scene.file):
         bringing = [effect.name for effect in Effect.registry if effect.name in ("rotary_inertia", "tip_mass")]
         problem = Problem.of(scene).turning().replace(effects=tuple(bringing))

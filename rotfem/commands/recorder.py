@@ -241,7 +241,7 @@ class Recorder:
         pitch = () if system.motion.pitch is None else ("pitch",)
         columns = ("t", "psi", "psi_dot", *names, *energies, *root, *system.support_forces(), *free, *pitch)
         self._last: State | None = None
-        self.snapshots = Snapshots() if output.fields else None
+        self.snapshots = Snapshots(system.structure) if output.fields else None
         self.stations = None if output.stations is None else StationRows(system, output)
         of_stations = () if self.stations is None else ("x", *self.stations.names)
         taken = (*columns, *stress, *of_stations, *named)
