@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
+import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -27,6 +28,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
+from rotfem.numerics.projection import with_ghosts
 from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
@@ -482,6 +484,23 @@ class Plate(Structure):
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return how a mode travels around a disk; None of other plates."""
         return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
+
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have, of its squares."""
+        element, owned = self.V.element.basix_element, self.mesh.topology.index_map(2).size_local
+        points, weights = basix.make_quadrature(element.cell_type, 2 * element.degree)
+        less = basix.create_element(
+            basix.ElementFamily.P, element.cell_type, element.degree - 1, element.lagrange_variant
+        )
+        whole, part = (np.sqrt(weights)[:, None] * e.tabulate(0, points)[0, :, :, 0] for e in (element, less))
+        basis = np.linalg.qr(part)[0]
+        nodes = with_ghosts(self.V, x[: len(x) - len(x) % self.size]).reshape(-1, self.size)[:, self.moves]
+        shapes = nodes[self.V.dofmap.list[:owned]]
+        both = [
+            np.sum(np.abs(np.einsum("pn,cni->cpi", A, shapes)) ** 2) for A in (whole - basis @ (basis.T @ whole), whole)
+        ]
+        left, all_of_it = self.comm.allreduce(np.array(both))
+        return float(left / all_of_it)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""

@@ -553,6 +553,10 @@ class Structure:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
         return values
 
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have; of beams none."""
+        return 0.0
+
     def total(self, q: Array) -> Array:
         """Return q (local dof array) with rotations that are counted from the undeformed structure."""
         return q if self.turns is None else self.turns.total(q)
