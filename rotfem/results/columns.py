@@ -92,7 +92,7 @@ COLUMNS = {
     "residual": ("backward error", "1"),
     "mesh_error": ("relative error that the mesh may cause", "1"),
     "error_bound": ("relative error that round-off may cause", "1"),
-    "confidence": ("squared correlation with the speed before", "1"),
+    "confidence": ("MAC with the previous speed", "1"),
     "turning": ("wave with the spin (1) or against it (−1)", "1"),
     "frequency_fixed": ("frequency, fixed frame", "rad/s"),
     "frequency_fixed_2": ("frequency of the smaller wave, fixed frame", "rad/s"),
