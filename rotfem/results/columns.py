@@ -63,6 +63,7 @@ COLUMNS = {
     **{f"n{ij}": (f"membrane force n{_SUB[ij[0]]}{_SUB[ij[1]]}", "N/m") for ij in ("11", "22", "12")},
     **{f"m{ij}": (f"moment m{_SUB[ij[0]]}{_SUB[ij[1]]}", "N") for ij in ("11", "22", "12")},
     **{f"q{i}": (f"shear force q{_SUB[i]}", "N/m") for i in "12"},
+    "twist": ("elastic twist about the bent axis", "rad"),
     "von_mises": ("equivalent stress", "Pa"),
     "von_mises_max": ("largest equivalent stress", "Pa"),
     "kinetic": ("kinetic energy", "J"),
