@@ -252,7 +252,8 @@ def estimate(answers: Answers, own: Answer, parts: bool = False) -> Errors:
     if (chords := own.outcome.chords) > 0.0:
         out.parts["geometry"] = chords
     if not registry.theories[setting.theory].exact:
-        out.parts["model"] = of_theory(out, answers, own, found or own)
+        poor = own if found is None or found.setting.degree > setting.degree else found
+        out.parts["model"] = of_theory(out, answers, own, poor)
     return out
 
 

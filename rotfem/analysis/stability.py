@@ -33,7 +33,6 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
 from rotfem.numerics.linear import (
     negative_count,
-    negative_eigenvalues,
     righted,
     symmetric,
     unknown_scale,
@@ -224,17 +223,19 @@ def constant_stability(system: System, newton: Newton) -> Stability | None:
 # --- the speed at which a linear theory loses its stiffness -----------------------------------------------------------
 
 
-#: Restarts in which eigenvalues are found that stand apart.
-SOON = 20
+#: Least part of an upper bound of Omega² that is looked at, the ratio to which it is enclosed before it is computed,
+#: and the one to which it is enclosed where eigenvalues are too close to each other.
+LEAST, NEAR, NEAREST = 1e-24, 2.0, 1.0 + 1e-9
 
 
 def critical_speed(system: System) -> float | None:
     """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
 
-    Of a nonlinear theory there is none: its stiffness is that of each equilibrium. One beyond a thousand
-    times the speed at which spin doubles a stiffness counts as none where it is not found at once.
+    Of a nonlinear theory there is none: its stiffness is that of each equilibrium.
 
-    K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
+    K = K_1 + s K_2, s = Omega²: the least positive s of K_1 x = −s K_2 x, at most that of a single unknown. Where spin
+    stiffens, most 1/s are negative and far larger. About a lower s' with a definite stiffness, by Cholesky's factor,
+    they are 1/(s − s'), above −1/s', so that the largest one stands apart if s' is near it.
     """
     if not system.linear:
         return None
@@ -244,39 +245,39 @@ def critical_speed(system: System) -> float | None:
     d = unknown_scale(K_2, K_1, 1.0)
     K_1.diagonalScale(d, d)
     K_2.diagonalScale(d, d)
-    K_2.scale(-1.0)
     if negative_count(righted(K_1, -1.0)) != 0:  # of a hinge without a spring round-off makes a stiffness, of any sign
         K_1 = righted(K_1)
-    # nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
-    nu = _largest(K_2, K_1, SOON)
-    if nu is None:
-        if _far(K_2, K_1):
-            return None
-        nu = _largest(K_2, K_1, 2000)
-    if nu is None:
-        raise ComputationError("the eigenproblem of the critical speed did not converge")
-    return float(1 / np.sqrt(nu)) if nu > 0 else None
+    single = K_2.getDiagonal()
+    single.pointwiseDivide(single, K_1.getDiagonal())
+    if (softest := single.min()[1]) >= 0.0:
+        return None
+
+    def at(square: float) -> Any:
+        K = K_1.copy()
+        K.axpy(square, K_2, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return K
+
+    low, high, ratio = -LEAST / softest, -1.0 / softest, NEAR
+    while high > NEAREST * low:
+        while high > ratio * low:
+            middle = float(np.sqrt(low * high))
+            low, high = (middle, high) if negative_count(at(middle)) == 0 else (low, middle)
+        if (nu := _largest(K_2, at(low))) is not None:
+            return float(np.sqrt(low + 1.0 / nu))
+        ratio = max(ratio**0.01, NEAREST)
+    return float(np.sqrt(low))
 
 
-def _far(A: Any, B: Any) -> bool:
-    """Return whether no eigenvalue of A x = nu B x is above 1e-6 times the largest in size, a negative one."""
-    stiffens = _largest(A, B, SOON, SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-    if stiffens is None or stiffens >= 0.0:
-        return False
-    there = B.copy()
-    there.axpy(1e6 / stiffens, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-    return negative_eigenvalues(there) == 0
-
-
-def _largest(A: Any, B: Any, restarts: int, which: Any = SLEPc.EPS.Which.LARGEST_REAL) -> float | None:
-    """Return the largest eigenvalue of A x = nu B x; None if it is not found in so many restarts."""
-    eps = SLEPc.EPS().create(A.comm)
+def _largest(A: Any, B: Any) -> float | None:
+    """Return the largest eigenvalue of −A x = nu B x; None where others are too near to find it soon."""
+    eps, opposite = SLEPc.EPS().create(A.comm), A.copy()
+    opposite.scale(-1.0)
     # B is definite, but round-off can have taken that away, so it is no inner product.
-    eps.setOperators(A, B)
+    eps.setOperators(opposite, B)
     eps.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
-    eps.setWhichEigenpairs(which)
-    eps.setDimensions(1, min(A.getSize()[0], 100))
-    eps.setTolerances(1e-12, restarts)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
+    eps.setDimensions(1, min(A.getSize()[0], 30))
+    eps.setTolerances(1e-12, 4)
     B.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     use_direct_solver(eps.getST().getKSP(), A.getSize()[0], symmetric=True)
     eps.solve()

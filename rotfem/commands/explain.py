@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -40,7 +39,7 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Series, Spectrum
 from rotfem.results.of_scene import ExplainResult
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
@@ -69,25 +68,10 @@ NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
 
-def explain(
-    scene: Scene | str | Path | Mapping[str, Any],
-    *,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Progress | None = None,
-    terms: Mapping[str, Work] | None = None,
+def explained(
+    scene: Scene, comm: MPI.Comm, progress: Progress | None = None, terms: Mapping[str, Work] | None = None
 ) -> ExplainResult:
-    """Return how much every effect and every theory changes the outputs of a scene, and the model that it calls for.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: MPI communicator; every rank gets the whole result.
-        progress: called with the share of the work done, between 0 and 1.
-        terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
-
-    Raises:
-        SceneError: the scene is not valid.
-    """
-    scene = as_scene(scene)
+    """Return how much every effect and theory changes the outputs of a scene (see `rotfem.explain`)."""
     with input_of(scene.file):
         of = Explanation(scene, terms or {}, comm)
         return of.result(progress or (lambda share: None))

@@ -241,7 +241,7 @@ def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) ->
 
 def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool) -> None:
     """Draw critical speeds, synchronous ones filled."""
-    for synchronous, name in ((True, "synchronous critical speed"), (False, "crossing with kΩ")):
+    for synchronous, name in ((False, "crossing with kΩ"), (True, "synchronous critical speed")):
         there = [c for c in result.critical_speeds if (c.kind != "per_rev") == synchronous]
         if there and (synchronous or not fixed):
             height = [seen_fixed(c) if fixed else c.frequency for c in there]

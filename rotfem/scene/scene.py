@@ -245,11 +245,13 @@ def with_shown(tables: dict[str, Any], what: str, given: object) -> dict[str, An
     return {**tables, "output": {**output, what: unit}}
 
 
-def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
-    """Return a validated scene from a scene, the path of a file or nested tables."""
+def as_scene(scene: Scene | str | Path | Mapping[str, Any], trust: bool = False) -> Scene:
+    """Return a validated scene from a scene, the path of a file or nested tables; trusted as in `load_scene`."""
     if isinstance(scene, Scene):
         return scene
-    return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
+    if isinstance(scene, Mapping):
+        return Scene._validate(scene, "scene", "scene", ".", trust)
+    return load_scene(scene, trust=trust)
 
 
 def plain(value: Any) -> Any:

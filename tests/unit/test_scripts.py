@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
+from inspect import signature
+from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 import rotfem
+from rotfem.commands.cli import app
+from rotfem.commands.verbs import OF_SCRIPTS, VERBS
 from rotfem.errors import InputError
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
@@ -135,3 +140,52 @@ def test_an_error_of_a_function_is_bad_input_with_its_traceback(case: str) -> No
     assert caught.value.key == key
     assert isinstance(caught.value.__cause__, KeyError)
     assert "in fails" in "".join(traceback.format_exception(caught.value))
+
+
+# --- Python is the command line ---------------------------------------------------------------------------------------
+
+#: Options that are no keyword: of the terminal, `Scene.replace`, and `hint`.
+OF_THE_TERMINAL = {"as_json", "quiet", "debug", "overrides", "no_advice", "help"}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_option_is_a_keyword_and_every_keyword_an_option(verb: str) -> None:
+    commands: Any = typer.main.get_command(app)
+    options = {str(option.name) for option in commands.commands[verb].params}
+    keywords = set(signature(getattr(rotfem, verb)).parameters)
+    given = {name.removeprefix("no_") for name in options - OF_THE_TERMINAL}
+    assert given == keywords - set(OF_SCRIPTS)
+    assert all(option.help for option in commands.commands[verb].params)
+
+
+@pytest.mark.parametrize(
+    ("verb", "options", "wanted"),
+    [
+        ("run", {"plots": False}, {"history.csv", "shape.csv", "summary.json"}),
+        ("modes", {"state_space": True, "matrices": True, "plots": False}, {"state_space.npz", "M.mtx"}),
+        ("campbell", {"speeds": "0:30:3rpm", "orders": "1,2", "operating": "10:20rpm"}, {"campbell.png"}),
+        ("check", {"report": True}, {"check.csv", "report.html"}),
+    ],
+)
+def test_keywords_write_what_options_write(
+    verb: str, options: dict[str, Any], wanted: set[str], tmp_path: Path
+) -> None:
+    getattr(rotfem, verb)(tables(), folder=tmp_path, **options)
+    assert wanted <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_modes_at_a_speed_are_those_of_the_scene_at_that_speed() -> None:
+    at = rotfem.modes(tables(), speed="60 rpm")
+    scene = rotfem.Scene.from_dict(tables()).replace({"motion.speed": "60 rpm"})
+    assert at.frequencies == pytest.approx(rotfem.modes(scene, error=False).frequencies, rel=1e-12)
+    table = tables(motion={"type": "table", "table": [[0, 0], [1, 1]], "axis": [0, 0, -1]})
+    assert rotfem.modes(table, speed=2.0).speed == 2.0
+
+
+def test_sweep_over_a_key_with_its_table() -> None:
+    scene = rotfem.Scene.from_dict(tables())
+    swept = rotfem.sweep(scene, {"motion.speed": [1.0, "30 rpm"], "modes.count": [1]}, "modes", speed=None)
+    alone = rotfem.modes(scene.replace({"motion.speed": "30 rpm", "modes.count": 1}))
+    assert swept.to_pandas()["frequency_1"].iloc[1] == pytest.approx(alone.frequencies[0], rel=1e-12)
+    with pytest.raises(InputError, match="unexpected keyword argument 'sped'"):
+        rotfem.sweep(scene, {"motion.speed": [1.0, 2.0]}, "modes", sped=1)
