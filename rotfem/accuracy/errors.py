@@ -13,9 +13,9 @@ section II.4).
 - Of elements of degree k of a beam, which end where its sections jump, p is 2k − 1: displacements at nodes and
   eigenvalues have 2k (Strang & Fix 1973, sections 1.6 and 6.3), one less where tables have kinks.
 - Of plates p is `CORNER`.
-- Above `ASYMPTOTIC`, and of plates, a third answer, coarser in the same ratio, shows whether the order holds. With d' its
-  distance to the second one q is d'/d, but at most rᵖ, above `ASYMPTOTIC` that of p = max(2, k), where the corners of
-  the clamp are not what counts. Where q is small, e is at most the larger one of both distances. Where d is smaller
+- Above `ASYMPTOTIC`, and of plates, a third answer, coarser in the same ratio, shows whether the order holds. With d'
+  its distance to the second one q is d'/d, but at most rᵖ, above `ASYMPTOTIC` that of p = max(2, k), where the corners
+  of the clamp are not what counts. Where q is small, e is at most the larger one of both distances. Where d is smaller
   than the highest order of a smooth answer makes it, it is so by chance, and that takes its place.
 - Where cells cannot be halved, the other answer has elements of one degree more, on plates and mesh files of one less,
   unless those lock.
