@@ -190,5 +190,5 @@ def of_velocities(system: System, rows: Any) -> Array:
             component, sign = turns[name]
             column[:] = sign * slopes[piece, component]
     rates: Array = out.ravel()
-    rates[structure.clamped_unknowns(structure.clamped)] = 0.0
+    rates[structure.clamped_unknowns(ghosts=True)] = 0.0
     return rates

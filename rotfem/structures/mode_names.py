@@ -135,13 +135,17 @@ STATIONS, ACROSS = 24, 4
 
 
 def plate_mode_name(
-    family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any], disk: Disk | None = None
+    family: str,
+    coordinates: dict[str, npt.NDArray[Any]],
+    y: npt.NDArray[Any],
+    disk: Disk | None = None,
+    cantilever: bool = True,
 ) -> ModeName:
     """Return the name of a plate mode.
 
     A plate clamped along an edge has "nth bending" (n − 1 nodal lines across it, none along), "nth torsion" (one line
     along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk "m nodal diameters, s circles", beside its
-    clamp.
+    clamp; one that is held otherwise "bending (m,n)", n − 1 lines along x and m − 1 across.
     """
     real = in_phase(y)
     if disk is not None:
@@ -150,6 +154,8 @@ def plate_mode_name(
     along, across = _lines(coordinates["x"], coordinates["y"], real)
     if family != "bending":
         return ModeName(family, across + 1)
+    if not cantilever:
+        return ModeName(family, across + 1, f"bending ({across + 1},{along + 1})")
     if along > 1:
         return ModeName("chordwise", across + 1, f"chordwise ({along},{across + 1})")
     return ModeName(("bending", "torsion")[along], across + 1)
