@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 import tomli_w
 from matplotlib.colors import to_hex
-from matplotlib.lines import Line2D
 
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, label_of, number
 from rotfem.results.files import json_text, write_text
@@ -199,8 +198,8 @@ def panel(axes: Any, x_range: Any) -> Any:
             way = "width" if across else "height"
             plot.add_layout(Span(location=place, dimension=way, line_color=colour, line_dash=dash, line_width=1))
             continue
-        said = str(line.get_label())
-        said = _text_at(axes, line, colour) if said.startswith("_") else said
+        said = str(line.get_gid() or line.get_label())
+        said = "" if said.startswith("_") else said
         x, y = thinned(np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
         drawn = named.setdefault(said, [])
         if style in dashes:
@@ -222,13 +221,6 @@ def panel(axes: Any, x_range: Any) -> Any:
     plot.grid.grid_line_color = "#e6eaee"
     plot.outline_line_color = "#c3cbd4"
     return plot
-
-
-def _text_at(axes: Any, line: Line2D, colour: str) -> str:
-    """Return the text of a line's colour that stands nearest to its end; nothing where there is none."""
-    end = float(np.asarray(line.get_ydata(), dtype=np.float64)[-1])
-    there = [text for text in axes.texts if to_hex(text.get_color()) == colour and hasattr(text, "xy")]
-    return str(min(there, key=lambda text: abs(float(text.xy[1]) - end)).get_text()) if there else ""
 
 
 def thinned(x: Array, y: Array) -> tuple[Any, Any]:
