@@ -30,9 +30,6 @@ Array = npt.NDArray[np.float64]
 #: Points of a line, and rows of a table, at most; numbers of modes that move.
 MOST_ROWS, MOST_NUMBERS = 2000, 60_000
 
-#: Largest displacement of a mode that moves, part of the size of the structure.
-AMPLITUDE = 0.15
-
 
 def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
     """Write report.html of a result, with a drawing of the scene's structure, into a folder; return its path."""
@@ -241,17 +238,14 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         return {}, ""
     surface = result.surface
     ends = np.concatenate([surface.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
-    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    extent = float(np.linalg.norm(high - low))
-    moves, cards = [], ""
+    middle, moves, cards = (surface.points.min(axis=0) + surface.points.max(axis=0)) / 2, [], ""
     for row, shape, frequency in result.with_shapes()[: max(1, MOST_NUMBERS // (6 * len(surface.points)))]:
-        z = surface.moved(shape)
-        z *= AMPLITUDE * extent / max(float(np.max(np.abs(z))), 1e-300)
+        z = surface.scale(shape) * surface.moved(shape)
         moves.append([np.round(part, 5).tolist() for part in (z.real, z.imag)])
         said = escape(f"{row['mode']}: {row['label']}, {frequency}")
         cards += f"<figure><canvas></canvas><figcaption>{said}</figcaption></figure>"
-    data = {"points": np.round(surface.points, 5).tolist(), "shapes": moves, "extent": extent}
+    data = {"points": np.round(surface.points, 5).tolist(), "shapes": moves, "extent": surface.size}
     if result.frame == "fixed":  # orbits of one corner of some sections
         data["orbits"] = (4 * np.unique(np.linspace(0, len(surface.points) // 4 - 1, 9).round())).astype(int).tolist()
-    data |= {"lines": np.unique(np.sort(ends, axis=1), axis=0).tolist(), "middle": ((low + high) / 2).tolist()}
+    data |= {"lines": np.unique(np.sort(ends, axis=1), axis=0).tolist(), "middle": middle.tolist()}
     return data, f'<p class="hint">Drag to turn the view.</p><div class="modes">{cards}</div>'
