@@ -470,11 +470,32 @@ class Plate(Structure):
 
     @property
     def doubt(self) -> str:
-        """What is said of a plate that is nearly round; "" of others."""
-        if not ROUND < self._outline.off <= NEARLY:
+        """What is said of a plate that is nearly round, or of fibres far stiffer than what joins them; "" of others."""
+        if ROUND < self._outline.off <= NEARLY:
+            off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
+            return (
+                f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+            )
+        return self._of_strips() if self.data.is_orthotropic else ""
+
+    def _of_strips(self) -> str:
+        """Return which modes in the plane the mesh has no waves for; "" of most materials.
+
+        Strips along the fibres, x, bend against each other without shear, u_2 = f cos(y/δ) and u_1 = −δ f' sin(y/δ):
+        with f'' = −k² f, ρ ω² = E_1 δ² k⁴ + E_2/δ², which is least, 2 k² √(E_1 E_2), for (k δ)⁴ = E_2/E_1.
+        """
+        s, across = self.data, int(self.data.E1 >= self.data.E2)
+        low, high = self._box()
+        k, E = np.pi / (2 * float(high[1 - across] - low[1 - across])), float(np.sqrt(s.E1 * s.E2))
+        wave = 2 * np.pi / k * (min(s.E1, s.E2) / max(s.E1, s.E2)) ** 0.25
+        x = self.mesh.geometry.x[self.mesh.geometry.dofmap, across]
+        widest = self.comm.allreduce(float(np.ptp(x, axis=1).max(initial=0.0)), op=MPI.MAX)
+        if constants(s)["G12"] < 2 * E or wave > 2 * widest:
             return ""
-        off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
-        return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+        return (
+            f"coarse: from about {k * np.sqrt(2 * E / s.rho):.3g} rad/s on strips along fibres bend in the plane, in "
+            f"waves of {wave:.2g} m across them, which cells of {widest:.2g} m do not have"
+        )
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
