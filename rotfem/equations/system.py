@@ -514,7 +514,7 @@ class System(ABC):
 
     def total(self, form: Any) -> float:
         """Return the value of a compiled functional over all ranks; 0 of None."""
-        return 0.0 if form is None else float(summed(self.comm, fem.assemble_scalar(form)))
+        return 0.0 if form is None else float(summed(self.comm, forms.functional(form)))
 
     def outputs(self) -> dict[str, float]:
         """Return the functionals of the problem at the state and time set."""

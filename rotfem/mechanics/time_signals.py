@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss, legvander
-from numpy.polynomial.polynomial import polyval
 
 from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import Torque
@@ -122,7 +121,8 @@ class TimeSignal:
         """Return f̄ of a step (see `Fit`) at times (n,), shape (n, components); at one, shape (components,)."""
         begin, end = line[-3:-1] if len(line) == 4 else line[:2]
         x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
-        return np.asarray(polyval(x, self._powers(line)), dtype=np.float64).T
+        powers = self._powers(line)
+        return np.asarray(np.power.outer(x, np.arange(len(powers))) @ powers)
 
     def _powers(self, line: Any) -> Array:
         """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""

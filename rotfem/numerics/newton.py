@@ -53,8 +53,8 @@ class Newton:
     """Newton iteration that is judged by its increments.
 
     A residual tolerance would lie below round-off where axial and bending stiffness differ by ten orders; the size of
-    the increment, in the units of the unknowns, does not. Once the quadratic constant kappa = |d_1|/|d_0|^2 is known
-    from an earlier solve, an iteration whose predicted successor is below tolerance is the last.
+    the increment, in the units of the unknowns, does not. With the quadratic constant kappa = |d_1|/|d_0|², of this
+    solution or of an earlier one, an iteration whose predicted successor, 4 kappa d², is below tolerance is the last.
 
     Attributes:
         tolerance: largest accepted increment, relative to the scale of each unknown.
@@ -91,7 +91,8 @@ class Newton:
         previous, first, stalled, k, tangents = np.inf, np.inf, 0, 0, 0
         while tangents < self.max_iterations and k < 3 * self.max_iterations:
             k += 1
-            new = factor is None or factor.renewed()
+            cheap = k == 2 and 8 * self._kappa**2 * first**3 <= self.tolerance  # the old factor is enough
+            new = not cheap if factor is None else factor.renewed()
             tangents += new
             d, exact = increment(new)
             self.iterations += 1
@@ -111,7 +112,7 @@ class Newton:
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 factor.judge(d, enough)
-            elif d <= self.tolerance or (k == 1 and self._successor(d) <= self.tolerance):
+            elif min(d, self._successor(d, k, previous, new)) <= self.tolerance:
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
@@ -127,10 +128,12 @@ class Newton:
             f"wanted {self.tolerance:.0e}"
         )
 
-    def _successor(self, d: float) -> float:
-        """Return the most that the next increment after one of size d may be: anything, after a long one.
+    def _successor(self, d: float, k: int, previous: float, new: bool) -> float:
+        """Return the most that the increment after number k, of size d, may be, by the one before.
 
-        Of increments twice as long as any that kappa was found with it says nothing, as along an axis on which the
-        equations are linear.
+        Of a first one kappa says so, but nothing of one twice as long as any that it was found with, as along an axis
+        on which the equations are linear.
         """
-        return 4 * self._kappa * d**2 if d <= 2.0 * self._longest else np.inf
+        if k == 1:
+            return 4 * self._kappa * d**2 if d <= 2.0 * self._longest else np.inf
+        return 4 * d**3 / previous**2 if new else 2 * d**2 / previous
