@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import LONGEST, Array, Observer, Pace, Scheme, Shifts, Stage, State
-from rotfem.analysis.time_grid import Interval, intervals, knots_of
+from rotfem.analysis.time_grid import Interval, intervals, jumps_of, knots_of
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
@@ -164,8 +164,10 @@ class March:
         steps, step, reached = self.steps, float(self.steps.step or 0.0), state.t
         times = np.append(np.arange(int(np.ceil(steps.end / step - 1e-9))) * step, steps.end)
         divided = self.scheme.order > 2
-        knots = knots_of(self.system.signals, times, steps.breakpoints, divided)
-        grid = (part for part in intervals(knots, times, step, divided) if part.end > reached)
+        signals = self.system.signals
+        knots = knots_of(signals, times, steps.breakpoints, divided)
+        jumps = jumps_of(signals, times, steps.breakpoints) if divided else None
+        grid = (part for part in intervals(knots, times, step, jumps) if part.end > reached)
         for part, after in pairwise(chain(grid, [None])):
             assert part is not None
             start = self.begun(state, View(1), part) if state.t == 0.0 else state
@@ -256,7 +258,7 @@ class March:
             return Interval(stop, h, at_knot=bool(at))
         fitted = Interval(stop, h, line=(t, stop, 3))
         inside = knots[first:last]
-        if len(inside) > 1 and self._lost(state, fitted, inside, error) <= allowed:
+        if self._lost(state, fitted, inside, error) <= allowed:
             return fitted
         stop = float(inside[0])
         return Interval(stop, stop - t, at_knot=True)
@@ -385,7 +387,8 @@ class March:
         `before` is how the step that ends with it evaluates signals.
         """
         after = View(1, part.line)
-        if before.side == 0 and before.line == part.line:
+        same = all(line is None or (len(line) == 3 and line[2] == 3) for line in (before.line, part.line))
+        if before.side == 0 and (same or before.line == part.line):
             return state
         s, t = self.system, state.t
         s.count_rotations_from(state.reference)

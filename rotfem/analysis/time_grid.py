@@ -30,6 +30,9 @@ FEW, SHORTEST, CLOSE = 4, 1e-3, 1e-9
 #: to itself: that of a wave of 22 steps a period, (ωh)²/8.
 RESOLVED = 1e-2
 
+#: Part of a signal's largest value from which on a step of fourth order ends at a jump, however many there are.
+LARGE = 0.1
+
 #: Steps for each knot from which on straight lines in those with knots, each as dear as four, cost no third of a march.
 RARE = 12
 
@@ -64,24 +67,30 @@ class Interval:
         return View(-1 if self.at_knot else 0, self.line)
 
 
-def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
-    """Yield the intervals of steps between times (s), nominally `step` long (s), `divided` at few knots (s)."""
+def intervals(knots: Array, times: Array, step: float, jumps: Array | None) -> Iterator[Interval]:
+    """Yield the intervals of steps between times (s), nominally `step` long (s), with knots (s) in them.
+
+    Of schemes of fourth order they end at the jumps (s) among the knots, if these are few; others have None.
+    """
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]
-    fine = [False, *(before[1:] - after[:-1] > 1) & (not divided), False]  # of the steps, with one more at both ends
+    fine = [False, *(before[1:] - after[:-1] > 1) & (jumps is None), False]  # of the steps, with one more at both ends
     begin, length = ends[0], step
     for i, end in enumerate(ends[1:]):
-        inside: Any = knots[after[i] : before[i + 1]].tolist() if there[i] else []
+        inside: Any = knots[after[i] : before[i + 1]] if there[i] else np.empty(0)
         at_knot = bool(there[i] and before[i + 1] < after[i + 1])
         last = float(knots[before[i + 1]]) if at_knot else end
-        stops = [*inside, last] if divided and len(inside) <= FEW else [last]
+        cuts = [] if jumps is None else inside[np.isin(inside, jumps)].tolist()
+        stops = [*cuts, last] if len(cuts) <= FEW else [last]
         if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORTEST * step:
             stops = [last]
-        line: Fit | None = (begin, last, 1) if len(stops) <= len(inside) else None
-        if fine[i + 1]:
-            line = (ends[i - 1] if fine[i] else begin, begin, last, ends[i + 2] if fine[i + 2] else last)
         for stop in stops:
+            line: Fit | None = None
+            if fine[i + 1]:
+                line = (ends[i - 1] if fine[i] else begin, begin, last, ends[i + 2] if fine[i + 2] else last)
+            elif np.any((inside > begin) & (inside < stop)):
+                line = (begin, stop, 3 if jumps is not None and len(cuts) < len(stops) else 1)
             taken = stop - begin  # of one length to the last digit, so that the matrix stays
             if abs(taken - step) <= close:
                 length = step
@@ -96,15 +105,26 @@ def knots_of(
 ) -> Array:
     """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
 
-    Steps of second order (not `divided`, see `intervals`) do without those that they resolve, others without kinks of
-    rates if these are many.
+    Steps of second order (not `divided`, see `intervals`) do without those that they resolve.
     """
     for signal in signals:
         find_knots(signal, times, breakpoints)
-    rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
-    of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
+    of_signals = [np.union1d(s.knots, s.bent) if divided else unresolved(s, times) for s in signals]
     found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
     return found
+
+
+def jumps_of(signals: Sequence[TimeSignal], times: Array, breakpoints: Sequence[float] = ()) -> Array:
+    """Return breakpoints and the knots (s) at which steps of fourth order end: rare or large jumps of signals."""
+    found = [np.array(breakpoints, dtype=np.float64)]
+    for signal in signals:
+        before, after = (signal.values(signal.knots * (1 + side * SAME)) for side in (-1, 1))
+        if len(signal.knots):
+            size = max(np.abs(before).max(), np.abs(after).max())
+            change = np.linalg.norm(after - before, axis=1)
+            jumps = change > CLOSE * size
+            found.append(signal.knots[jumps if RARE * jumps.sum() < len(times) else change > LARGE * size])
+    return np.unique(np.concatenate(found))
 
 
 def unresolved(signal: TimeSignal, times: Array) -> Array:

@@ -46,6 +46,8 @@ POINTS = POINTS + 0.5
 #: Column k: coefficients of the powers of x in (2k + 1) P_k, up to cubics.
 LEGENDRE = np.array([[1.0, 0.0, -2.5, 0.0], [0.0, 3.0, 0.0, -10.5], [0.0, 0.0, 7.5, 0.0], [0.0, 0.0, 0.0, 17.5]])
 
+LEGENDRE_P = LEGENDRE / np.array([1.0, 3.0, 5.0, 7.0])
+
 
 @dataclass
 class View:
@@ -130,8 +132,12 @@ class TimeSignal:
             if len(line) == 4:
                 first, last = self._joint(*line[:3]), self._joint(*line[1:])
                 powers = np.array([first + last, last - first]) / 2
+            elif line[2] == 1:
+                powers = LEGENDRE[:2, :2] @ self._moments(*line)
             else:
-                powers = LEGENDRE[: line[2] + 1, : line[2] + 1] @ self._moments(*line)
+                mean, first = self._moments(*line[:2], 1) * np.array([[1.0], [3.0]])
+                begin, end = self.values(np.array([line[0] + SAME * (abs(line[0]) or SAME), line[1] * (1 - SAME)]))
+                powers = LEGENDRE_P @ np.array([mean, first, (begin + end) / 2 - mean, (end - begin) / 2 - first])
             self._fit = line, powers
         return self._fit[1]
 
