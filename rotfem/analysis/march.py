@@ -25,7 +25,7 @@ from rotfem.analysis.schemes import LONGEST, Array, Observer, Pace, Scheme, Shif
 from rotfem.analysis.time_grid import Interval, intervals, jumps_of, knots_of
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
-from rotfem.mechanics.time_signals import SAME, View
+from rotfem.mechanics.time_signals import SAME, View, has_ends
 from rotfem.numerics.linear import DirectSolver, combine
 from rotfem.numerics.newton import REACH, Factor, Newton
 from rotfem.numerics.projection import PlusLowRank, sparse_part, with_ghosts
@@ -246,7 +246,7 @@ class March:
         """Return an interval from a state on that is about as long as wanted.
 
         It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible:
-        then they are their best cubics in it.
+        then cubics replace them in it.
         """
         t, end = state.t, float(self.steps.end)
         left = end - t
@@ -275,7 +275,7 @@ class March:
         off = sum(signal.deviation(times, *part.line) for signal in s.signals)
         t, c = float(times[int(np.argmax(off))]), np.pi * n / part.length
         s.count_rotations_from(state.reference)
-        moved = []
+        moved = list[Array]()
         for view in (View(-1), View(0, part.line)):
             with s.view.as_in(view):
                 s.set_time(t)
@@ -387,8 +387,7 @@ class March:
         `before` is how the step that ends with it evaluates signals.
         """
         after = View(1, part.line)
-        same = all(line is None or (len(line) == 3 and line[2] == 3) for line in (before.line, part.line))
-        if before.side == 0 and (same or before.line == part.line):
+        if before.side == 0 and (before.line == part.line or (has_ends(before.line) and has_ends(part.line))):
             return state
         s, t = self.system, state.t
         s.count_rotations_from(state.reference)

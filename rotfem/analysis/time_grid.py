@@ -4,8 +4,8 @@ Knots are the instants at which a signal or its rate may jump: rows of tables, e
 `time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
 its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order; where all of them are
 near straight lines already, as tables of what steps resolve, by their values. Lines of neighbouring steps with several
-knots each join. Schemes of higher order,
-and adaptive steps, take a step with few knots in intervals from one to the next; with more they use lines as well.
+knots each join. In steps of higher order cubics replace the signals, with the values at the ends of the step as well.
+Such steps end at jumps that are rare or large, if they are few in a step; with more of them straight lines serve too.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rotfem.mechanics.time_signals import SAME, Fit, TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
-#: Most knots in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
+#: Most jumps in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
 FEW, SHORTEST, CLOSE = 4, 1e-3, 1e-9
 
 #: Distance of a signal from its chord over a step, as a part of its largest value, that a scheme of second order leaves

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
