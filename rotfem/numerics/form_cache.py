@@ -63,6 +63,14 @@ def folder() -> Path:
         logging.getLogger("rotfem").warning(message, path, why)
         path = Path(tempfile.mkdtemp(prefix="rotfem-forms-"))
         atexit.register(shutil.rmtree, path, ignore_errors=True)
+    return path
+
+
+@cache
+def part(name: str) -> Path:
+    """Return a folder in the cache: FFCx lists the whole folder of a form that it loads, so that it must be short."""
+    path = folder() / name
+    path.mkdir(mode=0o700, exist_ok=True)
     clear(path)
     return path
 

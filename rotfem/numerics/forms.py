@@ -186,12 +186,13 @@ FLAGS = ("-g0", "-w")
 def form(f: Any, once: bool = False) -> Any:
     """Return a UFL form compiled, over the communicator of its mesh."""
     mesh = f.ufl_domains()[0].ufl_cargo()
-    return _compiled(fem.form, f, comm=mesh.comm, flag=(SELDOM if once else OFTEN)[mesh.topology.dim])
+    flag = (SELDOM if once else OFTEN)[mesh.topology.dim]
+    return _compiled(fem.form, f, comm=mesh.comm, part=f.signature()[:2], flag=flag)
 
 
-def _compiled(make: Callable[..., Any], *arguments: Any, comm: MPI.Comm, flag: str) -> Any:
-    """Return what dolfinx makes of a form or an expression; rank 0 says where its code is kept."""
-    began, folder = cpu_time(), comm.bcast(form_cache.folder() if comm.rank == 0 else None)
+def _compiled(make: Callable[..., Any], *arguments: Any, comm: MPI.Comm, part: str, flag: str) -> Any:
+    """Return what dolfinx makes of a form or an expression; rank 0 says in which part of the cache its code is."""
+    began, folder = cpu_time(), comm.bcast(form_cache.part(part) if comm.rank == 0 else None)
     options = {"form_compiler_options": dict(form_cache.FORM_OPTIONS)}
     with form_cache.in_use(folder):
         out = make(*arguments, **options, jit_options=form_cache.jit_options(folder, [flag, *FLAGS]))
@@ -250,7 +251,7 @@ def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:
 
 def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
     """Return a UFL expression compiled for evaluation at points of the reference cell, shape (number, dim)."""
-    return _compiled(fem.Expression, e, points, comm, comm=comm, flag="-O2")
+    return _compiled(fem.Expression, e, points, comm, comm=comm, part="expressions", flag="-O2")
 
 
 def without(f: Any, *functions: Any) -> Any:
