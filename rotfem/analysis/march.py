@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import LONGEST, Array, Observer, Pace, Scheme, Shifts, Stage, State
-from rotfem.analysis.time_grid import Interval, intervals, jumps_of, knots_of
+from rotfem.analysis.time_grid import Interval, intervals, knots_of
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View, has_ends
@@ -163,11 +163,8 @@ class March:
         """Yield the states at step, 2 step, … and end (s); the last step may be shorter."""
         steps, step, reached = self.steps, float(self.steps.step or 0.0), state.t
         times = np.append(np.arange(int(np.ceil(steps.end / step - 1e-9))) * step, steps.end)
-        divided = self.scheme.order > 2
-        signals = self.system.signals
-        knots = knots_of(signals, times, steps.breakpoints, divided)
-        jumps = jumps_of(signals, times, steps.breakpoints) if divided else None
-        grid = (part for part in intervals(knots, times, step, jumps) if part.end > reached)
+        knots = knots_of(self.system.signals, times, steps.breakpoints, self.scheme.order > 2)
+        grid = (part for part in intervals(*knots, times, step) if part.end > reached)
         for part, after in pairwise(chain(grid, [None])):
             assert part is not None
             start = self.begun(state, View(1), part) if state.t == 0.0 else state
@@ -193,9 +190,7 @@ class March:
         end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
-        signals = self.system.signals
-        found = knots_of(signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
-        knots = np.unique(np.concatenate([found, *(s.bent for s in signals)]))
+        knots, _ = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 

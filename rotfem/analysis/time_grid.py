@@ -67,7 +67,7 @@ class Interval:
         return View(-1 if self.at_knot else 0, self.line)
 
 
-def intervals(knots: Array, times: Array, step: float, jumps: Array | None) -> Iterator[Interval]:
+def intervals(knots: Array, jumps: Array | None, times: Array, step: float) -> Iterator[Interval]:
     """Yield the intervals of steps between times (s), nominally `step` long (s), with knots (s) in them.
 
     Of schemes of fourth order they end at the jumps (s) among the knots, if these are few; others have None.
@@ -102,43 +102,35 @@ def intervals(knots: Array, times: Array, step: float, jumps: Array | None) -> I
 
 def knots_of(
     signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = (), divided: bool = True
-) -> Array:
-    """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
+) -> tuple[Array, Array | None]:
+    """Return the knots (s) of all signals, and those at which steps of fourth order (`divided`) end; else None.
 
-    Steps of second order (not `divided`, see `intervals`) do without those that they resolve.
+    Knots are searched between times (s) where they are not known. Steps of second order do without those that they
+    resolve. Others end at breakpoints, and at jumps that are rare or large.
     """
+    knots, jumps = [np.array(breakpoints, dtype=np.float64)], [np.array(breakpoints, dtype=np.float64)]
     for signal in signals:
         find_knots(signal, times, breakpoints)
-    of_signals = [np.union1d(s.knots, s.bent) if divided else unresolved(s, times) for s in signals]
-    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
-    return found
-
-
-def jumps_of(signals: Sequence[TimeSignal], times: Array, breakpoints: Sequence[float] = ()) -> Array:
-    """Return breakpoints and the knots (s) at which steps of fourth order end: rare or large jumps of signals."""
-    found = [np.array(breakpoints, dtype=np.float64)]
-    for signal in signals:
-        before, after = (signal.values(signal.knots * (1 + side * SAME)) for side in (-1, 1))
-        if len(signal.knots):
-            size = max(np.abs(before).max(), np.abs(after).max())
-            change = np.linalg.norm(after - before, axis=1)
-            jumps = change > CLOSE * size
-            found.append(signal.knots[jumps if RARE * jumps.sum() < len(times) else change > LARGE * size])
-    return np.unique(np.concatenate(found))
-
-
-def unresolved(signal: TimeSignal, times: Array) -> Array:
-    """Return the knots (s) of a signal that are rare, or in steps between times (s) in which it jumps or is bent."""
-    knots: Array = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
-    if RARE * len(knots) < len(times):
-        return knots
-    f, (before, after) = signal.values(times), (signal.values(knots * (1 + side * SAME)) for side in (-1, 1))
-    step = np.clip(np.searchsorted(times, knots), 1, len(times) - 1)
-    share = ((knots - times[step - 1]) / (times[step] - times[step - 1]))[:, None]
-    chord, size = (1 - share) * f[step - 1] + share * f[step], max(np.abs(x).max() for x in (f, before, after))
-    jumps = np.linalg.norm(after - before, axis=1) > CLOSE * size
-    off = np.linalg.norm(before - chord, axis=1) > RESOLVED * size
-    return np.asarray(knots[np.isin(step, step[jumps | off])])
+        there = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
+        if divided:
+            knots.append(signal.bent)
+        if not len(there):
+            continue
+        before, after = (signal.values(there * (1 + side * SAME)) for side in (-1, 1))
+        size = max(np.abs(x).max() for x in (before, after))
+        change = np.linalg.norm(after - before, axis=1)
+        jump = change > CLOSE * size
+        jumps.append(there[jump if RARE * jump.sum() < len(times) else change > LARGE * size])
+        if divided or RARE * len(there) < len(times):
+            knots.append(there)
+        else:
+            step = np.clip(np.searchsorted(times, there), 1, len(times) - 1)
+            share = ((there - times[step - 1]) / (times[step] - times[step - 1]))[:, None]
+            f = signal.values(times)
+            chord = (1 - share) * f[step - 1] + share * f[step]
+            off = np.linalg.norm(before - chord, axis=1) > RESOLVED * max(size, np.abs(f).max())
+            knots.append(there[np.isin(step, step[jump | off])])
+    return np.unique(np.concatenate(knots)), np.unique(np.concatenate(jumps)) if divided else None
 
 
 def find_knots(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:

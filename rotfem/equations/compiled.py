@@ -6,7 +6,7 @@ elimination, with one factorisation for two right-hand sides.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from time import perf_counter
 from typing import Any
 
@@ -133,17 +133,15 @@ class WithHub(System):
         b, c = self.spin_derivative(c_v, c_m), row.row(shifts)
         by_angle, by_speed = row.hub.torque.slopes(self.time, row.seen)
         r, d = -row.residual(self.time), row.diagonal(c_v, c_m) - c_k * by_angle - c_v * by_speed
-        assembled_at = perf_counter()
-        self._border = Border(self, self.factor(A, changed), b, c, d)
-        out = self._border(R, r)
-        self.seconds["assemble"] += assembled_at - started
-        self.seconds["solve"] += perf_counter() - assembled_at
-        return out
+        return self._solved(started, R, r, lambda: Border(self, self.factor(A, changed), b, c, d))
 
     def chord(self) -> Array:
         """Return the correction of (q, psi) at the state with the present factor and border."""
-        started = perf_counter()
-        R, r, assembled_at = self.residual(), -self.row.residual(self.time), perf_counter()
+        return self._solved(perf_counter(), self.residual(), -self.row.residual(self.time), lambda: self._border)
+
+    def _solved(self, started: float, R: Any, r: float, border: Callable[[], Border]) -> Array:
+        """Return the solution with a border, and count the time of its two parts."""
+        assembled_at, self._border = perf_counter(), border()
         out = self._border(R, r)
         self.seconds["assemble"] += assembled_at - started
         self.seconds["solve"] += perf_counter() - assembled_at

@@ -53,8 +53,9 @@ class Newton:
     """Newton iteration that is judged by its increments.
 
     A residual tolerance would lie below round-off where axial and bending stiffness differ by ten orders; the size of
-    the increment, in the units of the unknowns, does not. With the quadratic constant kappa = |d_1|/|d_0|², of this
-    solution or of an earlier one, an iteration whose predicted successor, 4 kappa d², is below tolerance is the last.
+    the increment, in the units of the unknowns, does not. Once the quadratic constants kappa = |d_2|/|d_1|² and
+    |d_3|/|d_2|² are known from earlier solves, a first iteration whose predicted successor is below tolerance is the
+    last, and a second one whose successor is below a ten-thousandth of it, as errors of q are c_a times as large in a.
 
     Attributes:
         tolerance: largest accepted increment, relative to the scale of each unknown.
@@ -72,8 +73,8 @@ class Newton:
     diverging: bool = False
     wandered: bool = False
     roundoff: float = 0.0
-    _kappa: float = field(default=np.inf, repr=False)
-    _longest: float = field(default=0.0, repr=False)
+    _kappa: list[float] = field(default_factory=lambda: [np.inf, np.inf], repr=False)
+    _longest: list[float] = field(default_factory=lambda: [0.0, 0.0], repr=False)
 
     @classmethod
     def of(cls, settings: Any) -> Newton:
@@ -91,8 +92,7 @@ class Newton:
         previous, first, stalled, k, tangents = np.inf, np.inf, 0, 0, 0
         while tangents < self.max_iterations and k < 3 * self.max_iterations:
             k += 1
-            cheap = k == 2 and 8 * self._kappa**2 * first**3 <= self.tolerance  # the old factor is enough
-            new = not cheap if factor is None else factor.renewed()
+            new = factor is None or factor.renewed()
             tangents += new
             d, exact = increment(new)
             self.iterations += 1
@@ -102,17 +102,20 @@ class Newton:
                 return k
             if k == 1:
                 first = d
-            if k == 2 and first > 0 and factor is None:
-                self._kappa = max(0.5 * self._kappa if math.isfinite(self._kappa) else 0.0, d / first**2)
-                self._longest = max(first, 0.5 * self._longest)
+            if factor is None and 1 < k < 4 and previous > 0:
+                i = k - 2
+                self._kappa[i] = max(0.5 * self._kappa[i] if math.isfinite(self._kappa[i]) else 0.0, d / previous**2)
+                self._longest[i] = max(previous, 0.5 * self._longest[i])
+            # Newton's last increment leaves an error of its square; those with an old factor leave a part of
+            # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
+            enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
             if factor is not None:
-                # Newton's last increment leaves an error of its square; those with an old factor leave a part of
-                # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
-                enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 factor.judge(d, enough)
-            elif min(d, self._successor(d, k, previous, new)) <= self.tolerance:
+            elif d <= self.tolerance or (
+                k < 3 and self._successor(d, k) <= (self.tolerance if k == 1 else 1e-4 * self.tolerance)
+            ):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
@@ -128,12 +131,10 @@ class Newton:
             f"wanted {self.tolerance:.0e}"
         )
 
-    def _successor(self, d: float, k: int, previous: float, new: bool) -> float:
-        """Return the most that the increment after number k, of size d, may be, by the one before.
+    def _successor(self, d: float, k: int) -> float:
+        """Return the most that the increment after number k, 1 or 2, of size d may be: anything, after a long one.
 
-        Of a first one kappa says so, but nothing of one twice as long as any that it was found with, as along an axis
-        on which the equations are linear.
+        Of increments twice as long as any that kappa was found with it says nothing, as along an axis on which the
+        equations are linear.
         """
-        if k == 1:
-            return 4 * self._kappa * d**2 if d <= 2.0 * self._longest else np.inf
-        return 4 * d**3 / previous**2 if new else 2 * d**2 / previous
+        return 4 * self._kappa[k - 1] * d**2 if d <= 2.0 * self._longest[k - 1] else np.inf
