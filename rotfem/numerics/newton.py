@@ -102,20 +102,18 @@ class Newton:
                 return k
             if k == 1:
                 first = d
-            if factor is None and 1 < k < 4 and previous > 0:
+            if factor is None and 1 < k < 4 and 0 < previous <= REACH:
                 i = k - 2
                 self._kappa[i] = max(0.5 * self._kappa[i] if math.isfinite(self._kappa[i]) else 0.0, d / previous**2)
                 self._longest[i] = max(previous, 0.5 * self._longest[i])
-            # Newton's last increment leaves an error of its square; those with an old factor leave a part of
-            # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
-            enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
             if factor is not None:
+                # Newton's last increment leaves an error of its square; those with an old factor leave a part of
+                # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
+                enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 factor.judge(d, enough)
-            elif d <= self.tolerance or (
-                k < 3 and self._successor(d, k) <= (self.tolerance if k == 1 else 1e-4 * self.tolerance)
-            ):
+            elif d <= self.tolerance or (k < 3 and self._is_last(k - 1, d)):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
@@ -131,10 +129,10 @@ class Newton:
             f"wanted {self.tolerance:.0e}"
         )
 
-    def _successor(self, d: float, k: int) -> float:
-        """Return the most that the increment after number k, 1 or 2, of size d may be: anything, after a long one.
+    def _is_last(self, i: int, d: float) -> bool:
+        """Return whether the successor of increment i, 0 or 1, of size d is predicted to be small enough.
 
         Of increments twice as long as any that kappa was found with it says nothing, as along an axis on which the
         equations are linear.
         """
-        return 4 * self._kappa[k - 1] * d**2 if d <= 2.0 * self._longest[k - 1] else np.inf
+        return d <= 2.0 * self._longest[i] and 4 * self._kappa[i] * d**2 <= (self.tolerance, 1e-4 * self.tolerance)[i]
