@@ -380,7 +380,7 @@ def test_symmetries_and_tangents(theory: str) -> None:
 def test_a_factor_kept_over_steps_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps with an old factor against steps with their own: the same history to the tolerance, spin-up and after.
 
-    150 steps that are left off by 1e-12 of the length are off by 1.5e-8 of the displacement if all add up.
+    60 steps that are left off by 1e-12 of the length are off by 6e-9 of the displacement if all add up.
     """
     import rotfem.equations.system
 
@@ -388,8 +388,8 @@ def test_a_factor_kept_over_steps_changes_nothing(monkeypatch: pytest.MonkeyPatc
         0.05,
         model__theory="reissner",
         mesh__elements=[4, 4],
-        motion={"type": "spin_up", "speed": 30.0, "duration": 0.1, "axis": [0, 1, 0]},
-        time={"end": 0.15, "step": 1e-3},
+        motion={"type": "spin_up", "speed": 30.0, "duration": 0.04, "axis": [0, 1, 0]},
+        time={"end": 0.06, "step": 1e-3},
         solver__increment_tolerance=1e-12,
     )
     kept = rotfem.run(scene)
@@ -568,14 +568,13 @@ def saw(mesh: Path, **changes: Any) -> dict[str, Any]:
     return {"structure": structure, "motion": {"type": "constant", "speed": 1.0}, "modes": {"count": 5}} | changes
 
 
-@pytest.mark.parametrize("size", [0.02, 0.03])
-def test_a_disk_is_one_on_any_mesh(size: float, tmp_path: Path) -> None:
+def test_a_disk_is_one_on_any_mesh(tmp_path: Path) -> None:
     """Synchronous critical speed of a plain annulus on meshes of rings, 6570.5 rpm: 2e-3; names, with holes too."""
-    diagram = rotfem.campbell(saw(free_mesh(tmp_path / "a.msh", size)), "6000:7000:2rpm", orders=0)
+    diagram = rotfem.campbell(saw(free_mesh(tmp_path / "a.msh", 0.03)), "6000:7000:2rpm", orders=0)
     (found,) = diagram.critical_speeds
     assert (found.kind, found.label) == ("backward", "2 nodal diameters, backward")
     np.testing.assert_allclose(found.speed, 6570.5 * np.pi / 30, rtol=2e-3)
-    labels = rotfem.modes(saw(free_mesh(tmp_path / "b.msh", size, 0.01))).labels
+    labels = rotfem.modes(saw(free_mesh(tmp_path / "b.msh", 0.03, 0.01))).labels
     assert [text.partition(" nodal")[0] for text in labels] == ["1", "1", "0", "2", "2"]
 
 
