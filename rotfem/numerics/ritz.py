@@ -187,6 +187,28 @@ def _real_span(v: Array) -> Array:
     return np.asarray(np.linalg.svd(np.hstack([v.real, v.imag]), full_matrices=False)[0][:, : v.shape[1]])
 
 
+def smoothest(
+    pairs: tuple[Array, Array, Array], matrices: tuple[Array, Array, Array], count: int, norm: float
+) -> tuple[Array, Array, Array]:
+    """Return those (λ, x, y) of all of a small pencil that have the smoothest shapes, slowest without damping first.
+
+    Of each conjugate pair there is one. The entries of K are rounded to a part of the norm.
+    """
+    (values, x, y), (m, c, k) = pairs, matrices
+    turn_equal(values, (x, y), (m, c, k))
+    # The square of a larger eigenvalue, times anything, may be no number any more.
+    upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
+    zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * norm
+    both = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ, or ±iλ
+    falling = (values.imag == 0.0) & (values.real < 0.0)
+    upper &= ~(falling & np.any(both & zero[:, None] & zero, axis=0))
+    if not np.any(upper):
+        raise ComputationError("damping is so far out of proportion that no mode is left")
+    values, x, y = values[upper], x[:, upper], y[:, upper]
+    order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
+    return values[order], x[:, order], y[:, order]
+
+
 class RitzPairs:
     """Ritz pairs of M, C and K (balanced matrices) in a growing real basis.
 
@@ -225,21 +247,9 @@ class RitzPairs:
         return int(W.shape[1])
 
     def solve(self, count: int) -> None:
-        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair."""
+        """Set the pairs to those of the smoothest shapes (see `smoothest`)."""
         m, c, k = (summed(self.comm, self.V.T @ P) for P in self._products)
-        values, x, y = quadratic(m, c, k, self.target)
-        turn_equal(values, (x, y), (m, c, k))
-        # The square of a larger eigenvalue, times anything, may be no number any more.
-        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
-        zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * self.norms[2]
-        pairs = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ, or ±iλ
-        falling = (values.imag == 0.0) & (values.real < 0.0)
-        upper &= ~(falling & np.any(pairs & zero[:, None] & zero, axis=0))
-        if not np.any(upper):
-            raise ComputationError("damping is so far out of proportion that no mode is left")
-        values, x, y = values[upper], x[:, upper], y[:, upper]
-        order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
-        self.values, x, y = values[order], x[:, order], y[:, order]
+        self.values, x, y = smoothest(quadratic(m, c, k, self.target), (m, c, k), count, self.norms[2])
         MX, CX, KX = (P @ x for P in self._products)
         self.right, self.left = self.V @ x, self.V @ y
         size = self.norms @ np.abs(np.array([self.values**2, self.values, np.ones_like(self.values)]))

@@ -399,9 +399,9 @@ class Plate(Structure):
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk)
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode travels around a disk; None of other plates."""
-        return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return how modes travel around a disk; empty of other plates."""
+        return [] if self.disk is None else [self.disk.wave(w, axis[2]) for w in values[..., 2]]
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""
