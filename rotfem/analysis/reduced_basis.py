@@ -25,7 +25,7 @@ from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, product
 from rotfem.errors import ComputationError
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
+from rotfem.numerics.eigenproblem import BACKWARD_TOLERANCE, Eigenpairs, Pencil, RoundOff, backward_errors, relative
 from rotfem.numerics.linear import ROUNDED, unknown_scale
 from rotfem.numerics.projection import spanned, summed, times
 from rotfem.numerics.ritz import MORE, TINY, heavily_damped, quadratic, smoothest
@@ -36,7 +36,7 @@ Array = npt.NDArray[Any]
 MANY = 3
 
 #: Least parts of vectors in the basis over a range, whose square is left in eigenvalues; equilibria that are one.
-PARTS, EQUAL_EQUILIBRIA = 1e-7, 1e-12
+PARTS, EQUAL_EQUILIBRIA = 1e-8, 1e-12
 
 #: Modes of a model beyond those that are known at its speeds: those that a branch may pass through.
 FURTHER = 3
@@ -125,12 +125,12 @@ class SpeedModel:
         nodes: speed (rad/s) and pencil of each place that the polynomials go through.
         even: whether K is a polynomial of Ω², or else of Ω.
         count: number of modes.
-        rest: equilibrium of all speeds, if it is one.
         least: parts of vectors that the basis may lack.
 
     Attributes:
         lift: V, and M V at the first node.
         checks: speeds of full solutions, with the largest relative difference of a frequency there.
+        rest: equilibrium of all speeds, if it is one.
     """
 
     def __init__(
@@ -140,11 +140,10 @@ class SpeedModel:
         nodes: Iterable[tuple[float, Pencil]],
         even: bool,
         count: int,
-        rest: Array | None = None,
         least: float = 1e-10,
     ):
         self.analysis, self.count, self._even = analysis, count, even
-        self._rest: Array = np.empty(0) if rest is None else rest
+        self.rest: Array = np.empty(0)
         self.checks: list[dict[str, float]] = []
         speeds, matrices, self._asymmetries = list[float](), list[list[Array]](), dict.fromkeys("MCK", 0.0)
         for speed, pencil in nodes:
@@ -194,7 +193,7 @@ class SpeedModel:
         except ComputationError:  # K is singular: aim beside zero
             least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
             pairs = pencil.first(count, 0.1 * float(np.sqrt(least)))
-        return Spinning(self.analysis, speed, self._rest, pencil, pairs, pencil, lift=self.lift)
+        return Spinning(self.analysis, speed, self.rest, pencil, pairs, pencil, lift=self.lift)
 
     def singular(self, low: float, high: float) -> Array:
         """Return the speeds between two at which K is singular, increasing; K is taken to be linear in Ω² there."""
@@ -253,7 +252,9 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
 
     def model() -> SpeedModel:
         nodes = ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in (first, 0.5 * (first + last), last))
-        return SpeedModel(analysis, np.hstack(columns), nodes, False, count, rest, PARTS)
+        out = SpeedModel(analysis, np.hstack(columns), nodes, False, count, PARTS)
+        out.rest = rest
+        return out
 
     start = solved(first)
     rest = start.q
@@ -275,14 +276,17 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
     return None if gaps else found
 
 
-def with_errors(found: Spinning) -> Spinning:
-    """Return modes of a model over a range, with their errors in the full system."""
+def with_errors(found: Spinning) -> Spinning | None:
+    """Return modes of a model over a range, with their errors in the full system; None where these are too large."""
     analysis = found.analysis
     pencil = analysis.pencils(found.speed, found.q, keep=False)[0]
     pencil.asymmetries = found.pencil.asymmetries
     values, right, left = found.pairs.values, found.right, found.lifted(found.pairs.left)
     values, bounds = RoundOff(pencil).corrected(values, left, right)
-    found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=backward_errors(pencil, values, right))
+    errors = backward_errors(pencil, values, right)
+    if np.max(errors) > BACKWARD_TOLERANCE:
+        return None
+    found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=errors)
     separated = replace(found, pencil=pencil)
     analysis.separate(separated)
     return found

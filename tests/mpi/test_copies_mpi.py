@@ -1,4 +1,4 @@
-"""Of a small system every process computes a copy: results are those of one process, and frequencies of loads are shared out."""
+"""Of a small system every process computes a copy, with the results of one; frequencies of loads are shared out."""
 
 from __future__ import annotations
 
