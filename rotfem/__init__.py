@@ -24,18 +24,18 @@ if TYPE_CHECKING:
     from rotfem.analysis.schemes import Scheme as Scheme
     from rotfem.analysis.schemes import Stage as Stage
     from rotfem.analysis.schemes import State as State
-    from rotfem.commands.campbell import campbell as campbell
-    from rotfem.commands.check import check as check
     from rotfem.commands.cost import CostResult as CostResult
-    from rotfem.commands.cost import cost as cost
-    from rotfem.commands.explain import explain as explain
     from rotfem.commands.import_blade import import_blade as import_blade
-    from rotfem.commands.modes import modes as modes
     from rotfem.commands.problem import Problem as Problem
-    from rotfem.commands.response import response as response
-    from rotfem.commands.run import run as run
     from rotfem.commands.sweep import sweep as sweep
-    from rotfem.commands.unbalance import unbalance as unbalance
+    from rotfem.commands.verbs import campbell as campbell
+    from rotfem.commands.verbs import check as check
+    from rotfem.commands.verbs import cost as cost
+    from rotfem.commands.verbs import explain as explain
+    from rotfem.commands.verbs import modes as modes
+    from rotfem.commands.verbs import response as response
+    from rotfem.commands.verbs import run as run
+    from rotfem.commands.verbs import unbalance as unbalance
     from rotfem.mechanics.effects import DampingModel as DampingModel
     from rotfem.mechanics.effects import Effect as Effect
     from rotfem.mechanics.free_hub import FreeHub as FreeHub

@@ -85,7 +85,7 @@ def two_curves(path: Path) -> None:
     write_msh(path, POINTS, {**GROUPS, "outline": GROUPS["clamped"] + [[6, 3]]})
 
 
-LOOSE = 'not connected to the curve "clamped", one of them at'
+LOOSE = "not connected to a curve that is held, one at"
 #: Name ↦ what writes the file (None: there is none), and what the program must say of it.
 BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
     "no clamped group": (no_group, 'no physical curve "clamped" (physical curves: "edge")'),

@@ -230,7 +230,7 @@ class BranchPath:
         def g(x: float) -> float:
             return known[x] if x in known else f(self.joined(self.model.modes(x)))
 
-        speed = float(brentq(g, *known, xtol=1e-300, rtol=ZEROS))
+        speed = float(brentq(g, *known, xtol=ZEROS * (high.speed - low.speed), rtol=ZEROS))
         return speed if abs(g(speed)) < 1e-2 * min(map(abs, known.values())) + 1e-6 * abs(speed) else None
 
 

@@ -28,7 +28,7 @@ from rotfem.analysis.mixed_modes import MixedModes
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import by_family, massed
 from rotfem.equations.system import System
-from rotfem.errors import InputError
+from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
@@ -36,7 +36,7 @@ from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil, 
 from rotfem.numerics.forms import assembled
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
-from rotfem.structures.mode_names import ModeName, Wave, with_overdamped, with_whirl
+from rotfem.structures.mode_names import RIGID_BODY, ModeName, Wave, with_overdamped, with_whirl
 
 Array = npt.NDArray[Any]
 
@@ -192,18 +192,26 @@ class Spinning:
 
     @cached_property
     def names(self) -> list[ModeName]:
-        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction."""
-        families, out = [name for name in self.shares if name != "hub"], []
+        """The name of every mode, as its structure counts them; mixed ones name both families, rotors the direction.
+
+        One that nothing holds, zero to round-off, is "rigid body".
+        """
+        families, structure = [name for name in self.shares if name != "hub"], self.analysis.structure
+        out, rigid = [], []
         for j, x in enumerate(self.right.T):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            name = self.analysis.structure.mode_name(first, *self.analysis.structure.nodes(x))
-            out.append(name.mixed_with(others[0]) if others and self.shares[first][j] < 0.8 else name)
+            nodes = structure.nodes(x)
+            name = structure.mode_name(first, *nodes)
+            mixed = others and self.shares[first][j] < 0.8
+            out.append(name.mixed_with(structure.word(others[0])) if mixed else name)
+            rigid.append(bool(self.pairs.bounds[j] >= 1.0 and structure.is_rigid(*nodes)))
         pencil, pairs, speed = self.pencil, self.pairs, self.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
             sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
             out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
-        return with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
+        out = with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
+        return [RIGID_BODY if alone else name for name, alone in zip(out, rigid, strict=True)]
 
 
 def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
@@ -311,6 +319,10 @@ class ModalAnalysis:
         t1 = perf_counter()
         pencil, clamped = self.pencils(speed, q, keep)
         t2 = perf_counter()
+        if massed(clamped.M) == 0:
+            raise ComputationError(
+                "the structure has no mass, and so no modes", advice="rho, mass_per_length or masses"
+            )
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.factor = self.system.analysed

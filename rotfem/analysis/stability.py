@@ -15,7 +15,7 @@ section 7.1). Where follower forces make K unsymmetric, there is no such count, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -33,7 +33,6 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import EQUAL_EIGENVALUES, Eigenpairs, Pencil
 from rotfem.numerics.linear import (
     negative_count,
-    negative_eigenvalues,
     righted,
     symmetric,
     unknown_scale,
@@ -41,9 +40,15 @@ from rotfem.numerics.linear import (
 )
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
+from rotfem.structures.structure import Structure
 from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
+
+
+#: Part of a motion that cells of one degree less would not have, above which the mesh does not resolve it: half a wave
+#: over a cell of degree 2 has 0.19 of it, a quarter of a wave 0.01.
+UNRESOLVED = 0.1
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,7 @@ class Stability:
         frequency: of the motion that grows at that rate, rad/s; 0 for a divergence.
         complete: whether no faster growth can have been missed.
         lost: whether a motion's growth is smaller than what round-off does to it.
+        coarse: whether the mesh does not resolve the motion that grows at that rate.
     """
 
     negative: int | None = 0
@@ -63,11 +69,12 @@ class Stability:
     frequency: float = 0.0
     complete: bool = True
     lost: bool = False
+    coarse: bool = False
 
     @property
     def stable(self) -> bool | None:
-        """Whether no small disturbance grows; None where round-off hides it."""
-        if self.lost and self.growth == 0.0:
+        """Whether no small disturbance grows; None where round-off or the mesh hides it."""
+        if self.coarse or (self.lost and self.growth == 0.0):
             return None
         return self.growth == 0.0 and (self.complete or not self.negative)
 
@@ -85,6 +92,11 @@ class Stability:
             )
         if self.stable:
             return ""
+        if self.coarse:
+            return (
+                "unresolved equilibrium: on this mesh a disturbance with waves as short as its cells grows as "
+                f"exp({self.growth:.6g} t), which a finer mesh may not have; more mesh.elements, or cells less oblong"
+            )
         if self.stable is None:
             return "whether the equilibrium is stable is lost in round-off"
         if self.growth == 0.0:
@@ -118,53 +130,56 @@ def stability_of(system: System, q: Array, speed: float) -> Stability:
         return Stability()
     matrices = (system.matrix(0.0, 0.0, 1.0, 0.0), system.matrix(0.0, 1.0, 0.0, 0.0), K)
     clamped = Pencil(*matrices)
-    return stability_of_pencil(clamped if system.hub is None else Pencil(*system.with_hub(matrices)), clamped)
+    pencil = clamped if system.hub is None else Pencil(*system.with_hub(matrices))
+    return stability_of_pencil(system.structure, pencil, clamped)
 
 
-def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
-    """Return the stability of the equilibrium that M, C and K are about."""
+def stability_of_pencil(structure: Structure, pencil: Pencil, clamped: Pencil) -> Stability:
+    """Return the stability of the equilibrium of a structure that M, C and K are about."""
     negative = None if clamped.factor is None else clamped.factor.negative
     negative = negative_count(clamped.K) if negative is None else negative
     if negative == 0:
         return Stability()
     if pencil is clamped:
-        return by_motions(pencil, negative)
+        return by_motions(structure, pencil, negative)
     # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
-    return by_motions(pencil, None, clamped.scale())
+    return by_motions(structure, pencil, None, clamped.scale())
 
 
-def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
+def by_motions(structure: Structure, pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
     """Return the stability that the eigenvalues of M, C and K decide."""
     count = 8 if negative is None else max(8, 2 * negative + 2)
     gyroscopic = negative is not None and not symmetric(pencil.C)  # forces that may stabilise it
     if negative and negative_count(pencil.K, sure=True) == 0:
         return Stability(negative, complete=False, lost=True)
-    growth = frequency = 0.0
+    found = Stability(negative)
     while True:
         try:
             pairs = pencil.solve(count, target)
         except ComputationError:
-            return Stability(negative, growth, frequency, complete=False)
-        values, bounds = pairs.values, pairs.bounds
+            return replace(found, complete=False)
         if target > 0.0:
-            values, bounds = values[bounds < 1.0], bounds[bounds < 1.0]
+            pairs = pairs.select(np.flatnonzero(pairs.bounds < 1.0))
+        values = pairs.values
         # Growth that round-off can have made is none.
-        grows = values[values.real > np.maximum(GROWTH, bounds) * np.abs(values)]
-        lost = len(grows) < int(np.sum(values.real > GROWTH * np.abs(values)))
+        grows = np.flatnonzero(values.real > np.maximum(GROWTH, pairs.bounds) * np.abs(values))
+        found = replace(found, lost=len(grows) < int(np.sum(values.real > GROWTH * np.abs(values))))
         if len(grows):
-            fastest = grows[np.argmax(grows.real)]
-            growth = float(fastest.real)
-            frequency = float(fastest.imag) if fastest.imag > EQUAL_EIGENVALUES * abs(fastest) else 0.0
+            fastest = grows[np.argmax(values.real[grows])]
+            rate, omega = float(values[fastest].real), float(values[fastest].imag)
+            omega = omega if omega > EQUAL_EIGENVALUES * abs(values[fastest]) else 0.0
+            coarse = structure.unresolved(pairs.right[:, fastest]) > UNRESOLVED
+            found = replace(found, growth=rate, frequency=omega, coarse=coarse)
         if negative is None:
-            return Stability(None, growth, frequency, lost=lost)
+            return found
         growing, swinging = _counted(pencil, pairs, gyroscopic)
         if swinging >= negative:  # they leave none to what grows
             return Stability(negative)
         if growing + swinging >= negative:
-            return Stability(negative, growth, frequency, lost=lost)
+            return found
         if count >= 64 or count >= pencil.K.getSize()[0]:
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
-            return Stability(negative, growth, frequency, complete=False, lost=lost or not gyroscopic)
+            return replace(found, complete=False, lost=found.lost or not gyroscopic)
         count *= 2
 
 
@@ -224,17 +239,19 @@ def constant_stability(system: System, newton: Newton) -> Stability | None:
 # --- the speed at which a linear theory loses its stiffness -----------------------------------------------------------
 
 
-#: Restarts in which eigenvalues are found that stand apart.
-SOON = 20
+#: Least part of an upper bound of Omega² that is looked at, the ratio to which it is enclosed before it is computed,
+#: and the one to which it is enclosed where eigenvalues are too close to each other.
+LEAST, NEAR, NEAREST = 1e-24, 2.0, 1.0 + 1e-9
 
 
 def critical_speed(system: System) -> float | None:
     """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
 
-    Of a nonlinear theory there is none: its stiffness is that of each equilibrium. One beyond a thousand
-    times the speed at which spin doubles a stiffness counts as none where it is not found at once.
+    Of a nonlinear theory there is none: its stiffness is that of each equilibrium.
 
-    K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
+    K = K_1 + s K_2, s = Omega²: the least positive s of K_1 x = −s K_2 x, at most that of a single unknown. Where spin
+    stiffens, most 1/s are negative and far larger. About a lower s' with a definite stiffness, by Cholesky's factor,
+    they are 1/(s − s'), above −1/s', so that the largest one stands apart if s' is near it.
     """
     if not system.linear:
         return None
@@ -244,39 +261,39 @@ def critical_speed(system: System) -> float | None:
     d = unknown_scale(K_2, K_1, 1.0)
     K_1.diagonalScale(d, d)
     K_2.diagonalScale(d, d)
-    K_2.scale(-1.0)
     if negative_count(righted(K_1, -1.0)) != 0:  # of a hinge without a spring round-off makes a stiffness, of any sign
         K_1 = righted(K_1)
-    # nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
-    nu = _largest(K_2, K_1, SOON)
-    if nu is None:
-        if _far(K_2, K_1):
-            return None
-        nu = _largest(K_2, K_1, 2000)
-    if nu is None:
-        raise ComputationError("the eigenproblem of the critical speed did not converge")
-    return float(1 / np.sqrt(nu)) if nu > 0 else None
+    single = K_2.getDiagonal()
+    single.pointwiseDivide(single, K_1.getDiagonal())
+    if (softest := single.min()[1]) >= 0.0:
+        return None
+
+    def at(square: float) -> Any:
+        K = K_1.copy()
+        K.axpy(square, K_2, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return K
+
+    low, high, ratio = -LEAST / softest, -1.0 / softest, NEAR
+    while high > NEAREST * low:
+        while high > ratio * low:
+            middle = float(np.sqrt(low * high))
+            low, high = (middle, high) if negative_count(at(middle)) == 0 else (low, middle)
+        if (nu := _largest(K_2, at(low))) is not None:
+            return float(np.sqrt(low + 1.0 / nu))
+        ratio = max(ratio**0.01, NEAREST)
+    return float(np.sqrt(low))
 
 
-def _far(A: Any, B: Any) -> bool:
-    """Return whether no eigenvalue of A x = nu B x is above 1e-6 times the largest in size, a negative one."""
-    stiffens = _largest(A, B, SOON, SLEPc.EPS.Which.LARGEST_MAGNITUDE)
-    if stiffens is None or stiffens >= 0.0:
-        return False
-    there = B.copy()
-    there.axpy(1e6 / stiffens, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-    return negative_eigenvalues(there) == 0
-
-
-def _largest(A: Any, B: Any, restarts: int, which: Any = SLEPc.EPS.Which.LARGEST_REAL) -> float | None:
-    """Return the largest eigenvalue of A x = nu B x; None if it is not found in so many restarts."""
-    eps = SLEPc.EPS().create(A.comm)
+def _largest(A: Any, B: Any) -> float | None:
+    """Return the largest eigenvalue of −A x = nu B x; None where others are too near to find it soon."""
+    eps, opposite = SLEPc.EPS().create(A.comm), A.copy()
+    opposite.scale(-1.0)
     # B is definite, but round-off can have taken that away, so it is no inner product.
-    eps.setOperators(A, B)
+    eps.setOperators(opposite, B)
     eps.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
-    eps.setWhichEigenpairs(which)
-    eps.setDimensions(1, min(A.getSize()[0], 100))
-    eps.setTolerances(1e-12, restarts)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
+    eps.setDimensions(1, min(A.getSize()[0], 30))
+    eps.setTolerances(1e-12, 4)
     B.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     use_direct_solver(eps.getST().getKSP(), A.getSize()[0], symmetric=True)
     eps.solve()

@@ -28,12 +28,12 @@ from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary
 from rotfem.commands.recorder import check_rows
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
-from rotfem.listeners import Hint, Progress, silent
+from rotfem.listeners import Hint, Progress
 from rotfem.mechanics.effects import Work
 from rotfem.numerics.eigenproblem import Eigenpairs
 from rotfem.results.campbell import CampbellResult
 from rotfem.results.files import json_text, writing
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 from rotfem.scene.values import LARGEST
 from rotfem.structures.mode_names import distinct, ordinal_ending
 from rotfem.units import speed_text, split_unit
@@ -64,55 +64,21 @@ def parse_speeds(text: str) -> list[float]:
     return [float(s) for s in speeds]
 
 
-def campbell(
-    scene: Scene | str | Path | Mapping[str, Any],
+def campbell_of(
+    scene: Scene,
     speeds: Sequence[float] | str,
-    *,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    orders: int | Sequence[int] | None = None,
-    rated: float | str | None = None,
-    operating: Sequence[float | str] | None = None,
-    only: bool = False,
-    map: Mapping[str, Sequence[float]] | str | None = None,
-    folder: Path | None = None,
-    progress: Progress | None = None,
-    hint: Hint | None = silent,
-    terms: Mapping[str, Work] | None = None,
+    marks: Mapping[str, Any],
+    only: bool,
+    map: Mapping[str, Sequence[float]] | str | None,
+    comm: MPI.Comm,
+    folder: Path | None,
+    progress: Progress | None,
+    hint: Hint | None,
+    terms: Mapping[str, Work] | None,
 ) -> CampbellResult:
-    """Return the modes of a scene followed over speed.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables; its own speed is not used.
-        speeds: increasing speeds in rad/s, or text such as "0:12:25".
-        comm: MPI communicator.
-        orders: k of the lines kΩ to cross, or their number, 1Ω … orders·Ω; by default those of the scene, or as many
-            as meet a branch in the range, at most 4.
-        rated: rated speed, rad/s or with a unit such as "12.1 rpm"; that of the scene if None.
-        operating: lowest and highest speed of operation, likewise.
-        only: whether to solve only these speeds: none is inserted where branches are ambiguous, and critical speeds
-            come from interpolation between them.
-        map: a scene key ↦ its values, or text such as "structure.supports.*.stiffness=1e6:1e9:20", spaced evenly on a
-            logarithmic scale: synchronous critical speeds of a shaft over them, without damping and unsymmetric
-            stiffnesses, are in `summary["map"]`.
-        folder: where the modes of speeds that are finished are kept if it is interrupted, and taken from when the same
-            is asked for again; None to keep none.
-        progress: called with the share of the speeds done, between 0 and 1.
-        hint: called with every line of advice before the computation starts; None asks for none.
-        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
-
-    Raises:
-        SceneError: the scene or the speeds are not valid.
-        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check; its attribute `result` holds
-            the diagram of the speeds before it.
-        Stopped: it was interrupted; likewise.
-    """
-    marks = {
-        "modes.orders": list(range(1, orders + 1)) if isinstance(orders, int) else orders,
-        "modes.rated": rated,
-        "modes.operating": operating,
-    }
-    given = {k: list(v) if isinstance(v, tuple) else v for k, v in marks.items() if v is not None}
-    scene = as_scene(scene).showing("speed", speeds).replace(given)
+    """Return the modes of a scene followed over speed (see `rotfem.campbell`); marks are keys of the scene."""
+    given = {key: list(mark) if isinstance(mark, tuple) else mark for key, mark in marks.items() if mark is not None}
+    scene = scene.showing("speed", speeds).replace(given)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
 
     def compute(variant: Scene, *_: Any) -> CampbellResult:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -19,24 +18,12 @@ from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.results.of_scene import CheckResult
 from rotfem.results.result import Array
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 
 
-def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI.COMM_WORLD) -> CheckResult:
-    """Return what the structure of a scene is: mass, centre of mass, moments, inertias, and its properties along it.
-
-    Integrals are those of the bodies that the equations are made of, on the scene's mesh, with all mass that there is,
-    whatever effects the scene lists.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: MPI communicator; every rank gets the whole result.
-
-    Raises:
-        SceneError: the scene is not valid, or a mesh or a section that cannot be computed with.
-    """
+def weighed(scene: Scene, comm: MPI.Comm) -> CheckResult:
+    """Return mass, inertias and properties of the structure of a scene (see `rotfem.check`)."""
     started = perf_counter()
-    scene = as_scene(scene)
     with input_of(scene.file):
         bringing = [effect.name for effect in Effect.registry if effect.name in ("rotary_inertia", "tip_mass")]
         problem = Problem.of(scene).turning().replace(effects=tuple(bringing))
@@ -48,7 +35,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         structure = scene.structure
         root = np.array(getattr(structure, "root_position", (structure.hub_radius, 0.0, 0.0)))
         axis = np.array(scene.motion.axis) / np.linalg.norm(scene.motion.axis)
-        center = np.array(body.first_moment / body.mass)
+        center = np.array(body.first_moment / (body.mass or 1.0))
         columns = columns_of(model.structure)
         found: dict[str, Any] = {
             **summary("check", scene, comm, model.structure.mesh.comm),
@@ -89,7 +76,7 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
         if f"EI{axis}" not in columns:
             continue
         stiff = np.sqrt(columns[f"EI{axis}"] / columns["EA"])
-        heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / columns["mass_per_length"])
+        heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / np.maximum(columns["mass_per_length"], 1e-300))
         apart = np.exp(np.abs(np.log(np.where(heavy > 0.0, heavy / stiff, 1.0))))
         what = f"radii of gyration about axis {axis} of stiffness and mass differ {{:.3g}} times"
         found.append((x, apart, 10.0, what))

@@ -1,4 +1,4 @@
-"""One command from its start to its exit status: who speaks, where results go, what an error prints.
+"""One verb from its start to its end: where results go, and of a command who speaks and what an error prints.
 
 Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
 """
@@ -12,13 +12,14 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import wrap
 from time import sleep
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from rotfem import units
 from rotfem.commands.interrupts import together
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from rotfem.results.result_set import ResultFolder, Writer
     from rotfem.scene import Scene
 
+R = TypeVar("R", bound="Result")
+
 
 def folded(text: str, at_terminal: bool) -> str:
     """Return a text with its lines folded to the width of the terminal; as it is where there is none."""
@@ -40,35 +43,105 @@ def folded(text: str, at_terminal: bool) -> str:
     return "\n".join("\n".join(wrap(x, width, **folds)) if len(x) > width else x for x in text.split("\n"))
 
 
-class Session:
+class Job:
+    """One verb on a scene: who computes it, and where its results go.
+
+    Attributes:
+        comm: processes of the command.
+        first: whether this is the one that writes.
+        scene: what it computes.
+        results: folder where its results go, if they do.
+    """
+
+    scene: Scene
+    results: ResultFolder | None = None
+
+    def __init__(self, comm: Any = None, plots: bool = True, report: bool = False):
+        if comm is None:
+            comm = ONE_PROCESS
+            with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
+                from mpi4py import MPI
+
+                comm = MPI.COMM_WORLD
+        self.comm, self.plots, self.report = comm, plots, report
+        self.first = bool(comm.rank == 0)
+        self._shown = False
+
+    def open(self, path: Path, command: str, inputs: Sequence[Path] | None = None) -> None:
+        """Make the result folder, where it is not there."""
+        from rotfem.results.result_set import ResultFolder
+
+        if self.report and find_spec("bokeh") is None:
+            raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")
+        self.results = ResultFolder(self.comm, path, command, self.scene.inputs if inputs is None else inputs)
+
+    def close(self, error: BaseException | None) -> None:
+        """Say in the folder how the command ended, where its results are not complete."""
+        if self.results is not None:
+            self.results.close(error)
+
+    def check_writable(self, option: str, path: str | Path | None, inputs: Sequence[Path]) -> None:
+        """See that the file of an option can be written, before anything is computed, and is none that was read."""
+        from rotfem.results.files import unwritable
+
+        reason = self.comm.bcast(unwritable(Path(path), inputs) if self.first and path is not None else None)
+        if reason:
+            raise SceneError("command line", option, str(path), reason)
+
+    def finish(self, result: R, further: Sequence[Writer] = (), last: bool = True) -> R:
+        """Write a result, its figures and what else is wanted; return it.
+
+        One that is not the last waits for its error; after it, the last one is written with that alone.
+        """
+        problems = self._written(result, further, last)
+        if problems:
+            raise problems[0]
+        return result
+
+    def _written(self, result: Result, further: Sequence[Writer], last: bool) -> list[OutputError | SceneError]:
+        if self.results is None:
+            return []
+        if self.report and last:
+            further = [*further, self._page(result)]
+        again, self._shown = self._shown, not last
+        return result.write_into(self.results, self.plots, further, again)
+
+    def _page(self, result: Result) -> Writer:
+        """Return what writes report.html of a result, with a drawing of the scene's structure."""
+        from rotfem.commands.check import weighed
+        from rotfem.results.report import write_report
+
+        drawing = None
+        if result.summary["command"] != "check":
+            with suppress(InputError, ComputationError):
+                drawing = weighed(self.scene, self.comm).plot()
+        return partial(write_report, result, drawing)
+
+    def say(self, *lines: str) -> None:
+        """Print what was done; a script has it in its result."""
+
+
+class Session(Job):
     """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
 
     It prints JSON of the summary and nothing else on stdout, errors only if it is quiet, and tracebacks to debug.
 
     Attributes:
-        comm: processes of the command.
         bar: progress of the computation.
-        scene: what it computes, of a verb on a scene.
-        results: folder where its results go, of those that have one.
-        hint: receives advice; None where none is wanted.
-        report: whether report.html is wanted.
     """
 
-    scene: Scene
-    results: ResultFolder
-    hint: Callable[[str], None] | None = None
-    report = False
-
-    def __init__(self, as_json: bool = False, quiet: bool = False, debug: bool = False, no_plots: bool = False):
-        self.comm: Any = ONE_PROCESS
-        with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
-            from mpi4py import MPI
-
-            self.comm = MPI.COMM_WORLD
-        self.as_json, self.quiet, self.debug, self.plots = as_json, quiet, debug, not no_plots
-        self.first = self.comm.rank == 0
+    def __init__(
+        self,
+        as_json: bool = False,
+        quiet: bool = False,
+        debug: bool = False,
+        plots: bool = True,
+        report: bool = False,
+    ):
+        super().__init__(None, plots, report)
+        self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.bar = ProgressBar()
-        self._warned, self._shown = 0, False
+        self._warned = 0
 
     def __enter__(self) -> Session:
         for stream in (sys.stdout, sys.stderr):
@@ -80,8 +153,7 @@ class Session:
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.bar.stop()
         units.SPEED.reset(self._unit)
-        if hasattr(self, "results"):
-            self.results.close(error)
+        self.close(error)
         self._pass_on()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
@@ -117,7 +189,7 @@ class Session:
         """Return where results are of a command that did not end well, and how it goes on; empty where none are."""
         from rotfem.results.result_set import kept_in
 
-        if not hasattr(self, "results"):
+        if self.results is None:
             return ""
         found = kept_in(self.results.path) if self.results.summary else []
         return "; ".join(["", f"results until then are in {self.results.path}", *found]) if found else ""
@@ -129,26 +201,15 @@ class Session:
             os._exit(status)
         raise SystemExit(status) from None
 
-    def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
-        """Return the result folder, made where it is not there; from now on signals end a command with its results."""
-        from rotfem.results.result_set import ResultFolder
-
+    def open(self, path: Path, command: str, inputs: Sequence[Path] | None = None) -> None:
+        """Make the result folder, where it is not there; from now on signals end a command with its results."""
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         if not gc.isenabled():  # see `rotfem.__main__`
             gc.freeze()
             gc.enable()
         if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        self.results = ResultFolder(self.comm, path, command, inputs)
-        return self.results
-
-    def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
-        """See that the file of an option can be written, before anything is computed, and is none that was read."""
-        from rotfem.results.files import unwritable
-
-        reason = self.comm.bcast(unwritable(path, inputs) if self.first else None)
-        if reason:
-            raise SceneError("command line", option, str(path), reason)
+        super().open(path, command, inputs)
 
     def start(self, title: str, unit: str = "rad/s") -> None:
         """Begin to show progress; messages have speeds in the unit, too."""
@@ -165,19 +226,13 @@ class Session:
         """Print a line of advice on stderr."""
         self.remark(f"hint: {line}")
 
-    def finish(self, result: Result, further: Sequence[Writer] = (), last: bool = True) -> None:
-        """Write a result, its figures and what else is wanted, and print it unless it failed.
-
-        One that is not the last waits for its error; after it, the last one is written and printed with that alone.
-        """
+    def finish(self, result: R, further: Sequence[Writer] = (), last: bool = True) -> R:
+        """Write a result and what else is wanted, and print it unless it failed; after its error that alone."""
         from rotfem.commands.printed import of_error, report
 
-        if self.report and last:
-            further = [*further, self._page(result)]
         self.bar.describe("writing results and figures")
         again = self._shown
-        problems = result.write_into(self.results, self.plots, further, again)
-        self._shown = not last
+        problems = self._written(result, further, last)
         self.bar.stop()
         if last:
             self.print_json(result.summary)
@@ -189,19 +244,9 @@ class Session:
             raise problems[0]
         if again:
             self.say(*of_error(result.summary))
-        elif result.status == "done":
+        elif result.status == "done" and self.results is not None:
             self.say(*report(result), f"results in {self.results.path}")
-
-    def _page(self, result: Result) -> Writer:
-        """Return what writes report.html of a result, with a drawing of the scene's structure."""
-        from rotfem.commands.check import check
-        from rotfem.results.report import write_report
-
-        drawing = None
-        if result.summary["command"] != "check":
-            with suppress(InputError, ComputationError):
-                drawing = check(self.scene, comm=self.comm).plot()
-        return partial(write_report, result, drawing)
+        return result
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""

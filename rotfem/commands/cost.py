@@ -19,7 +19,6 @@ from mpi4py import MPI
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
 from rotfem.accuracy.ladder import MOST_FAILURES, Clock, OverBudget, ladder, reduced
-from rotfem.accuracy.tuned import write_variant
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.answers import in_own_setting
 from rotfem.commands.explain import Output
@@ -36,7 +35,7 @@ from rotfem.mechanics.theories import theories as all_theories
 from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.distance import Spectrum
 from rotfem.results.result import Row, Rows
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 from rotfem.units import seconds_of
 
 if TYPE_CHECKING:
@@ -65,38 +64,19 @@ ERRORS = {
 }
 
 
-def cost(
-    scene: Scene | str | Path | Mapping[str, Any],
-    *,
-    quick: bool = False,
-    accuracy: float = 1e-4,
-    output: str | None = None,
-    budget: float | str | None = None,
-    theories: Sequence[str] | None = None,
-    schemes: Sequence[str] | None = None,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Progress | None = None,
+def studied(
+    scene: Scene,
+    quick: bool,
+    accuracy: float,
+    output: str | None,
+    budget: float | str | None,
+    theories: Sequence[str] | None,
+    schemes: Sequence[str] | None,
+    comm: MPI.Comm,
+    progress: Progress | None,
 ) -> CostResult:
-    """Return errors and times down the ladders of a scene, and the cheapest setting for a wanted accuracy.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        quick: few theories, and the scheme of the reference and the scene's own.
-        accuracy: relative error, that of the model included, for which a setting is recommended.
-        output: "tip" (displacements, relative to the largest), "frequencies" (eigenvalues, each relative to itself) or
-            "campbell" (eigenvalues at nine speeds from rest to the scene's); by default what the scene computes.
-        budget: CPU time of the study, s, or text such as "2min"; two minutes for a quick one, else twenty.
-        theories: to try, instead of those that the structure has.
-        schemes: time-stepping schemes to try, instead of all.
-        comm: MPI communicator.
-        progress: called with the share of the work done, between 0 and 1.
-
-    Raises:
-        SceneError: the scene, or a choice, is not valid.
-        ComputationError: not one setting could be computed.
-        Stopped: it was interrupted; its attribute `result` holds what was measured.
-    """
-    scene = in_own_setting(as_scene(scene))
+    """Return errors and times down the ladders of a scene (see `rotfem.cost`)."""
+    scene = in_own_setting(scene)
     output = checked(scene, accuracy, output)
     seconds = (120.0 if quick else 1200.0) if budget is None else seconds_of(budget, scene.file)
     named, tried, ways = chosen(scene, quick, theories, schemes)
@@ -147,7 +127,7 @@ def cost(
         reasons = [m.reason for m in study.measured.values() if m.reason] or [r["why"] for r in study.refused]
         raise ComputationError(f"no setting could be computed ({reasons[-1] if reasons else 'nothing was tried'})")
     if not study.reference.output.scale:
-        raise SceneError(scene.file, "cost --of", output, 'nothing moves; try output "frequencies"')
+        raise SceneError(scene.file, "cost --of", output, 'nothing moves; try "frequencies"')
     return result("done")
 
 
@@ -462,7 +442,7 @@ class CostResult(Rows):
             f"# {self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}:\n"
             f"# {row['words']}.\n# Measured: {measured(row)} with set-up.\n\n"
         )
-        return write_variant(self.scene, changes_of(self.scene, row), Path(path), remark)
+        return self.scene.replace(changes_of(self.scene, row)).write(path, remark)
 
     def tables(self) -> list[ShortTable]:
         """Return one row a setting, cheapest first; of many settings those of the Pareto front."""

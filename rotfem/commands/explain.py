@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -40,7 +39,7 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Series, Spectrum
 from rotfem.results.of_scene import ExplainResult
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
@@ -69,25 +68,10 @@ NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
 
-def explain(
-    scene: Scene | str | Path | Mapping[str, Any],
-    *,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Progress | None = None,
-    terms: Mapping[str, Work] | None = None,
+def explained(
+    scene: Scene, comm: MPI.Comm, progress: Progress | None = None, terms: Mapping[str, Work] | None = None
 ) -> ExplainResult:
-    """Return how much every effect and every theory changes the outputs of a scene, and the model that it calls for.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: MPI communicator; every rank gets the whole result.
-        progress: called with the share of the work done, between 0 and 1.
-        terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
-
-    Raises:
-        SceneError: the scene is not valid.
-    """
-    scene = as_scene(scene)
+    """Return how much every effect and theory changes the outputs of a scene (see `rotfem.explain`)."""
     with input_of(scene.file):
         of = Explanation(scene, terms or {}, comm)
         return of.result(progress or (lambda share: None))
@@ -206,10 +190,18 @@ class Explanation:
         self.given, self.terms, self.comm = scene, terms, comm
         frame = "rotating" if scene.model.frame == "inertial" else scene.model.frame
         self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": frame})
-        self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
+        problem = Problem.of(scene, terms=terms).replace(outputs={})
         self.inner, self.effects = communicator(problem, comm), problem.replace(effects=None).effective_effects()
-        self._systems: dict[tuple[str, str], Any] = {}
-        self.system = self._switched(problem)
+        self._systems, self._unable = dict[tuple[str, str], Any](), dict[str, dict[str, InputError]]()
+        while not hasattr(self, "system"):
+            try:
+                self.system = self._switched(problem)
+            except InputError as error:
+                if isinstance(scene.model.effects, tuple) or error.key != "model.effects":
+                    raise
+                able = tuple(name for name in problem.effective_effects() if name != error.value)
+                problem = problem.replace(effects=able)  # "auto" takes what the theory can have
+        self.problem = problem
         degree = self.system.V.element.basix_element.degree  # a default differs by cell
         self.own = replace(Setting.of(scene), degree=degree, effects=problem.effective_effects())
         self.absent, hub = self._absent(), problem.motion.hub
@@ -246,12 +238,22 @@ class Explanation:
     def _switched(self, problem: Problem) -> Any:
         """Return the system of a problem; those of one theory and mesh are one, with effects switched by constants."""
         whole = problem.replace(effects=None)
-        key = problem.theory.name, repr(problem.mesh)
-        if key not in self._systems:
-            system = self._systems[key] = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
-            if system.linear:
+        key, wanted = (problem.theory.name, repr(problem.mesh)), set(problem.effective_effects())
+        unable = self._unable.setdefault(problem.theory.name, {})
+        while key not in self._systems or wanted & set(unable):
+            for name in wanted & set(unable):
+                raise unable[name]
+            able = tuple(name for name in whole.effective_effects() if name not in unable)
+            system = compile_system(whole.replace(effects=able), self.inner, self.scene.time is not None, parted=True)
+            try:
                 system.check_terms()
-        self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
+            except InputError as error:
+                if error.key != "model.effects":
+                    raise
+                unable[error.value] = error  # of a linear theory, in which the others are seen without it
+            else:
+                self._systems[key] = system
+        self._systems[key].leave_out(set(whole.effective_effects()) - set(unable) - wanted)
         return self._systems[key]
 
     def _of(self, variant: Scene) -> tuple[Problem, Any, Newton]:

@@ -29,51 +29,42 @@ MOST_STATES = 200
 class Snapshots:
     """States of a history at ever wider intervals, so that there are never more than MOST_STATES."""
 
-    def __init__(self) -> None:
-        self.kept: list[tuple[float, Array, Array | None]] = []
+    def __init__(self, structure: Any):
+        self._total, self.kept = structure.total, list[tuple[float, Array, Array | None]]()
         self._every, self._count = 1, 0
 
     def add(self, t: float, q: Array, more: Array | None = None) -> None:
-        """Keep a copy of the local dof array q at time t (s), and more values (nodes, names), or pass it by."""
+        """Keep a copy of the local dof array q at time t (s), and more values (nodes, names), or pass it by.
+
+        Its rotations are counted from the undeformed structure then.
+        """
         if self._count % self._every == 0:
-            self.kept.append((t, q.copy(), more))
+            self.kept.append((t, self._total(q).copy(), more))
             if len(self.kept) > MOST_STATES:
                 self.kept, self._every = self.kept[::2], 2 * self._every
         self._count += 1
 
 
 def fields_writer(system: System, snapshots: Snapshots, names: tuple[str, ...]) -> Writer:
-    """Return what writes fields.xdmf and fields.h5 of a run into a folder, on all ranks together.
+    """Return what writes the surface of a run over time as fields.xdmf into a folder, on all ranks together.
 
     Names are those of the further values of its snapshots.
     """
     structure = system.structure
 
-    def displacement(t: float, q: Array) -> Array:  # in the turning frame
-        coordinates, values = structure.nodes(q[: len(system.zeros())])
-        return moved(structure, system.seen_from_hub(values, coordinates["x"], t))
-
     def write(folder: Path) -> list[Path]:
-        """Gather the displacements, and write them on rank 0."""
-        frames = [
-            (t, {"displacement": displacement(t, q)} | ({} if more is None else dict(zip(names, more.T, strict=True))))
-            for t, q, more in snapshots.kept
-        ]
-        points = structure.places(structure.nodes(system.zeros())[0])
-        surface = structure.surface()
-        cells = chain(len(points)) if surface is None else surface
-        return write_xdmf(folder / "fields.xdmf", points, cells, frames) if system.comm.rank == 0 else []
+        """Gather the unknowns, and write the displacements of the surface in the turning frame on rank 0."""
+        surface, frames = surface_of(structure, structure.nodes(system.zeros())[0]), []
+        for t, q, more in snapshots.kept:
+            coordinates, values = structure.nodes(q[: len(system.zeros())])
+            seen = system.seen_from_hub(values, coordinates["x"], t)
+            fields = {"displacement": surface.displaced(dict(zip(structure.components, seen.T, strict=False)))}
+            frames.append((t, fields if more is None else fields | dict(zip(names, more.T, strict=True))))
+        if system.comm.rank != 0:
+            return []
+        return write_xdmf(folder / "fields.xdmf", surface.points, surface.triangles, frames)
 
     return write
-
-
-def moved(structure: Any, values: Array) -> Array:
-    """Return the displacements (…, 3) among all unknowns (…, components)."""
-    out: Array = np.zeros((*values.shape[:-1], 3))
-    for i, name in enumerate(structure.components):
-        if name in ("u1", "u2", "u3"):
-            out[..., int(name[1]) - 1] = values[..., i]
-    return out
 
 
 # --- along the span ---------------------------------------------------------------------------------------------------
@@ -156,7 +147,7 @@ def columns_of(beam: Any, at: Array | None = None) -> dict[str, Array]:
 
 
 def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
-    """Return the surface that modes move, through the nodes of a mode shape.
+    """Return the surface of a structure, through nodes of coordinates such as those of a mode shape.
 
     The sections of a beam are drawn as the rectangles of their radii of gyration; those of a planar one are square.
     """
@@ -192,15 +183,14 @@ def modes_writer(analysis: Any, result: ModesResult) -> Writer:
 
 
 def write_xdmf(
-    path: Path, points: Array, cells: npt.NDArray[np.int64], frames: Iterable[tuple[float, Mapping[str, Array]]]
+    path: Path, points: Array, triangles: npt.NDArray[np.int64], frames: Iterable[tuple[float, Mapping[str, Array]]]
 ) -> list[Path]:
     """Write point data over time as path (.xdmf) and, beside it, .h5; return both paths.
 
-    Points (n, 3) are in m; cells, lines or triangles, have the numbers of theirs, (m, 2 or 3); frames are times (s)
-    with values (n,) or (n, 3) by name, the same names at all times.
+    Points (n, 3) are in m; triangles have the numbers of theirs, (m, 3); frames are times (s) with values (n,) or
+    (n, 3) by name, the same names at all times.
     """
-    heavy, per_cell = path.with_suffix(".h5"), cells.shape[1]
-    kind = "Polyline" if per_cell == 2 else "Triangle"
+    heavy = path.with_suffix(".h5")
     text = [
         '<Xdmf Version="3.0"><Domain>',
         f'<Grid Name="{path.stem}" GridType="Collection" CollectionType="Temporal">',
@@ -217,8 +207,8 @@ def write_xdmf(
 
         for number, (t, fields) in enumerate(frames):
             text.append(f'<Grid Name="{path.stem}" GridType="Uniform"><Time Value="{float(t)!r}"/>')
-            topology = f'<Topology TopologyType="{kind}" NodesPerElement="{per_cell}" NumberOfElements="{len(cells)}">'
-            text.append(f"{topology}{item('cells', cells)}</Topology>")
+            topology = f'<Topology TopologyType="Triangle" NodesPerElement="3" NumberOfElements="{len(triangles)}">'
+            text.append(f"{topology}{item('cells', triangles)}</Topology>")
             text.append(f'<Geometry GeometryType="XYZ">{item("points", points)}</Geometry>')
             for name, values in fields.items():
                 what = "Vector" if values.ndim > 1 else "Scalar"
@@ -227,8 +217,3 @@ def write_xdmf(
             text.append("</Grid>")
     write_text(path, "\n".join([*text, "</Grid></Domain></Xdmf>", ""]))
     return [path, heavy]
-
-
-def chain(points: int) -> npt.NDArray[np.int64]:
-    """Return the lines between points that follow each other, (points − 1, 2)."""
-    return np.column_stack([np.arange(points - 1), np.arange(1, points)])

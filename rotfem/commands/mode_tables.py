@@ -12,7 +12,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.results.modes import ModesResult
-from rotfem.structures.mode_names import Wave, distinct
+from rotfem.structures.mode_names import RIGID_BODY, Wave, distinct
 from rotfem.units import speed_text
 
 Array = npt.NDArray[Any]
@@ -31,7 +31,7 @@ def mode_tables(found: Spinning, count: int, formats: tuple[str, ...] | None = N
     if rigid:  # hub and structure turn together, λ = 0
         columns = rows[0] if rows else mode_rows(found.first(1))[0]
         first: dict[str, Any] = dict.fromkeys(columns, 0.0)
-        rows = [{**first, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}, *rows]
+        rows = [{**first, "mode": 1, "label": str(RIGID_BODY), "stability": "neutral", "share_hub": 1.0}, *rows]
     summary = {
         **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": found.speed},
         **{"effects": list(analysis.model.effects), "modes": rows, "shapes": {"length": structure.length}},
@@ -46,7 +46,8 @@ def mode_tables(found: Spinning, count: int, formats: tuple[str, ...] | None = N
 
 def remarks(spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
     """Return the stability of the equilibrium, and warnings of it, of the model, and of modes that grow."""
-    analysis, found = spinning.analysis, stability_of_pencil(spinning.pencil, spinning.clamped)
+    analysis = spinning.analysis
+    found = stability_of_pencil(analysis.structure, spinning.pencil, spinning.clamped)
     out = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(rows)]
     out += critical(rows, spinning.speed, analysis.fixed)
     # An instability that grows by more than those of the modes that are asked for is none of them.
@@ -59,8 +60,10 @@ def remarks(spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, 
 def mode_rows(spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     rows, pairs, waves = [], spinning.pairs, spinning.waves
-    names = distinct(spinning.names)
+    names, rigid = distinct(spinning.names), [name == RIGID_BODY for name in spinning.names]
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
+        if rigid[i]:
+            lam, bound = 0.0j, 0.0
         size = abs(lam) if bound < 1.0 else 0.0  # else λ is zero to round-off, whose sign is no damping
         rows.append(
             {
@@ -70,7 +73,7 @@ def mode_rows(spinning: Spinning) -> list[dict[str, Any]]:
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
                 "damping": float(-lam.real / size) if size > 0.0 else 0.0,
                 "growth": float(lam.real),
-                "stability": stability(lam, float(bound)),
+                "stability": "neutral" if rigid[i] else stability(lam, float(bound)),
                 **{f"share_{name}": float(share[i]) for name, share in spinning.shares.items()},
                 **(whirl(waves[i], lam, abs(spinning.speed)) if waves else {}),
                 "residual": float(error),

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from mpi4py import MPI
 
@@ -31,45 +30,35 @@ from rotfem.listeners import Compiling, Hint, cpu_time, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.results.modes import ModesResult
+from rotfem.results.modes import WORST_FIT, ModesResult
 from rotfem.results.result import Result
-from rotfem.scene import Scene, as_scene
+from rotfem.results.result_set import Writer
+from rotfem.scene import Scene
 
 R = TypeVar("R", bound=Result)
 
 
-def modes(
-    scene: Scene | str | Path | Mapping[str, Any],
-    *,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+def analysed(
+    scene: Scene,
+    comm: MPI.Comm,
     sensitivities: bool = False,
     blade_tables: bool = False,
     participation: bool = False,
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
 ) -> ModesResult:
-    """Return the modes of a scene at its final speed: that of a spin-up, at the end of [time], or the constant one.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: MPI communicator; every rank gets the whole result.
-        sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
-        blade_tables: also write polynomials and tables of the modes of a beam over its span.
-        participation: also say modal and effective masses (see `rotfem.analysis.modal`).
-        hint: called with every line of advice before the computation starts; None asks for none.
-        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
-
-    Raises:
-        SceneError: the scene is not valid.
-        ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
-    """
-    scene = as_scene(scene)
+    """Return the modes of a scene (see `rotfem.modes`)."""
     if blade_tables and scene.structure.type == "plate":
         raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
     def compute(variant: Scene, errors: Errors | None = None, known: Modes | None = None) -> ModesResult:
         found = _modes(variant, Problem.of(variant, terms=terms), comm, hint, errors, known)
         found.blade_tables = blade_tables
+        if blade_tables:
+            fitted = {row["mode"] for row in found.mode_polynomials()}
+            if names := ", ".join(row["label"] for row in found.rows if row["mode"] not in fitted):
+                why = f"none of degree 6 is within {100 * WORST_FIT:g} % of its flap, lag or twist"
+                found.summary["warnings"].append(f"no mode polynomial of {names}: {why}")
         if sensitivities:
             from rotfem.analysis.sensitivity import sensitivities as derivatives
 
@@ -81,6 +70,34 @@ def modes(
         return found
 
     return answered(scene, compute, comm, terms)
+
+
+def at_speed(scene: Scene, speed: float) -> Scene:
+    """Return a scene whose modes are those at a speed, rad/s."""
+    if scene.motion.type in ("constant", "spin_up"):
+        return scene.replace({"motion.speed": speed})
+    if scene.motion.is_free:
+        raise SceneError(scene.file, "motion.type", scene.motion.type, "has no speed that could be given")
+    kept = {
+        name: scene.tables["motion"][name] for name in ("axis", "base_acceleration") if name in scene.tables["motion"]
+    }
+    return scene.replace({"motion": {"type": "constant", "speed": speed, **kept}})
+
+
+def models(scene: Scene, result: ModesResult, state_space: bool, matrices: bool) -> list[Writer]:
+    """Return what writes the modal model and the matrices of modes."""
+    from rotfem.analysis.state_space import serial, write_matrices
+    from rotfem.analysis.state_space import state_space as reduced
+
+    further: list[Writer] = []
+    with input_of(scene.file):
+        if state_space:
+            model = reduced(result.analysis, result.spinning, scene.modes.count)
+            further.append(lambda folder: model.write(folder / "state_space.npz"))
+        if matrices:
+            serial(result.analysis, "the export of matrices")
+            further.append(lambda folder: write_matrices(result.analysis, result.spinning, folder))
+    return further
 
 
 def final_speed(scene: Scene, problem: ProblemData) -> float:
@@ -97,7 +114,7 @@ def answered(
         scene: of modes.
         compute: (scene) ↦ result; or (scene, errors, modes) of a setting that was found to be within the accuracy.
         comm: processes.
-        terms: see `modes`.
+        terms: see `rotfem.modes`.
         top: whether the accuracy is that of the modes at the highest speed, or else at the final one.
     """
     with input_of(scene.file):

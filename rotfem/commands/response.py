@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -38,7 +37,7 @@ from rotfem.mechanics.loads import Load, Loads, PlaceLoad, Term
 from rotfem.mechanics.motion import Motion
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -51,32 +50,16 @@ BEND, NARROW, DEEP = 0.2, 2e-4, 1e-6
 SWEPT = (0.0, 1.0, 2.0)
 
 
-def response(
-    scene: Scene | str | Path | Mapping[str, Any],
-    low: float | str | None = None,
-    high: float | str | None = None,
-    *,
-    number: int = 200,
-    per_rev: Sequence[float] = (),
-    comm: MPI.Comm = MPI.COMM_WORLD,
+def response_of(
+    scene: Scene,
+    low: float | str | None,
+    high: float | str | None,
+    number: int,
+    per_rev: Sequence[float],
+    comm: MPI.Comm,
 ) -> ResponseResult:
-    """Return amplitude and phase of tip, root and stations under the harmonic loads of a scene, over their frequency.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables; of its first `modes.count` modes the peaks are resolved.
-        low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; if None 0, or of a free hub, which nothing
-            holds, half the first frequency of a mode.
-        high: highest frequency; beyond the highest of the modes if None.
-        number: frequencies between them, at equal distances; those by which peaks are seen and curves run
-            smoothly come on top, of the latter no more than these.
-        per_rev: orders k; with them the frequencies are kΩ alone, as far as low and high are None.
-        comm: MPI communicator; every rank gets the whole result.
-
-    Raises:
-        SceneError: the scene is not valid, or has no harmonic load, no steady state or a free hub.
-        ComputationError: no equilibrium, eigenpairs that fail their check, or a frequency of a mode without damping.
-    """
-    scene, started = as_scene(scene).showing("frequency", high if low is None else low), perf_counter()
+    """Return amplitudes and phases under the harmonic loads of a scene (see `rotfem.response`)."""
+    scene, started = scene.showing("frequency", high if low is None else low), perf_counter()
     with input_of(scene.file):
         problem = Problem.of(scene)
         if any(support.of_frequency for support in getattr(scene.structure, "supports", ())):

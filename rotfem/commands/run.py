@@ -6,15 +6,12 @@ A run is the compiled system, what yields its states, the observers that see the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answer, Answers, Setting
 from rotfem.accuracy.outputs import OUTPUTS, chords, lines, of_columns, output_of
@@ -30,18 +27,17 @@ from rotfem.commands.interrupts import together
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary, timings
 from rotfem.commands.recorder import Log, Monitor, Recorder
-from rotfem.commands.run_store import RunStore, interval
+from rotfem.commands.run_store import RunStore
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError, Stopped, input_of
-from rotfem.listeners import Hint, Progress, computing, silent
+from rotfem.listeners import Hint, Progress, computing
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional, inactive_unknowns
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results.distance import Series
-from rotfem.results.result_set import ResultFolder
 from rotfem.results.run import RunResult, figures
-from rotfem.scene import Scene, Time, as_scene
+from rotfem.scene import Scene, Time
 from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
@@ -307,54 +303,6 @@ class Simulation:
 # --- the verb -----------------------------------------------------------------------------------------------------
 
 
-def run(
-    scene: Scene | str | Path | Mapping[str, Any],
-    *,
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    progress: Progress | None = None,
-    hint: Hint | None = silent,
-    terms: Mapping[str, Work] | None = None,
-    outputs: Mapping[str, Functional] | None = None,
-    parts: bool = False,
-    folder: str | Path | None = None,
-    checkpoint: str | int | None = None,
-    resume: bool = False,
-) -> RunResult:
-    """Return the time history of a scene, or its steady state where the spin is constant and [time] absent.
-
-    Args:
-        scene: scene, path of a scene file, or nested tables.
-        comm: communicator the structure is distributed over; every rank gets the whole result.
-        progress: called with the share of the work done, between 0 and 1.
-        hint: called with every line of advice before the computation starts, and on attempts at an accuracy that take
-            long; None asks for none.
-        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
-        outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
-        parts: estimate the errors of steps and mesh one by one, which takes two more answers in the place of one.
-        folder: where the results go, the history as it grows, all of them but figures at the end; None writes nothing.
-        checkpoint: how often checkpoints are written there: after "30s", or after 500 steps; never if None.
-        resume: go on from the checkpoint that is there.
-
-    Raises:
-        SceneError: the scene is not valid or cannot be run, or a checkpoint that is none of this run.
-        ComputationError: it failed; its attribute `result` holds what was computed until then.
-        OutputError: the folder cannot be written.
-    """
-    scene = as_scene(scene)
-    every = None if checkpoint is None else interval(checkpoint)
-    with nullcontext() if folder is None else ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
-        store = RunStore(comm, results, every, resume)
-        try:
-            done = simulate(scene, store, progress, hint, terms, outputs, parts=parts)
-        except (ComputationError, Stopped) as error:
-            if results is not None and error.result is not None:
-                error.result.write_into(results)
-            raise
-        if results is not None and (problems := done.write_into(results)):
-            raise problems[0]
-        return done
-
-
 def simulate(
     scene: Scene,
     store: RunStore,
@@ -365,7 +313,7 @@ def simulate(
     shown: Callable[[RunResult], object] = lambda result: None,
     parts: bool = False,
 ) -> RunResult:
-    """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
+    """Return the result of a scene (see `rotfem.run`), with what is kept of it on disk while it goes on.
 
     `shown` takes the result before its error is estimated.
     """

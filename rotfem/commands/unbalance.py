@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
@@ -20,7 +19,7 @@ from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.results.unbalance import UnbalanceResult
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -29,33 +28,15 @@ Array = npt.NDArray[Any]
 HALF_POWER = np.sqrt(0.5)
 
 
-def unbalance(
-    scene: Scene | str | Path | Mapping[str, Any],
+def whirl(
+    scene: Scene,
     speeds: Sequence[float] | str,
-    *,
-    probes: Sequence[tuple[float, float]] = (),
-    operating: Sequence[float] | None = None,
-    comm: MPI.Comm = MPI.COMM_WORLD,
+    probes: Sequence[tuple[float, float]],
+    operating: Sequence[float] | None,
+    comm: MPI.Comm,
 ) -> UnbalanceResult:
-    """Return amplitudes, phases, orbits and bearing forces of a shaft under its unbalances, over the speed.
-
-    Peaks are sought between the speeds. Their amplification factor is N_c/(N₂ − N₁), N₁ and N₂ the speeds at which the
-    larger semi-axis is 0.707 of that at the peak N_c; the separation margin is the distance of N_c from the operating
-    range, in parts of the nearer end of it (API 617, 8th edition, 1-2.6).
-
-    Args:
-        scene: scene, path of a scene file, or nested tables; its unbalances are `loads.unbalance` and masses off
-            the axis.
-        speeds: rad/s, increasing, or a text "first:last:number" with a unit.
-        probes: pairs of a place (m) and an angle (rad) from direction 2 towards direction 3 that a probe looks along.
-        operating: lowest and highest operating speed (rad/s).
-        comm: MPI communicator; every rank gets the whole result.
-
-    Raises:
-        SceneError: the scene is not valid, is no round shaft, or has no unbalance.
-        ComputationError: no equilibrium.
-    """
-    shown = as_scene(scene).showing("speed", speeds)
+    """Return amplitudes, phases, orbits and bearing forces of a shaft over the speed (see `rotfem.unbalance`)."""
+    shown = scene.showing("speed", speeds)
     asked, started = parse_speeds(speeds) if isinstance(speeds, str) else list(map(float, speeds)), perf_counter()
     with input_of(shown.file):
         problem = Problem.of(shown).spinning()

@@ -1,446 +1,479 @@
-"""The verbs on a scene, with their options: each makes a result of the scene of a session."""
+"""The verbs on a scene, as a script calls them; `rotfem.commands.cli` makes a command of each, with the same keywords.
+
+A keyword is an option of the same name, its help is what the docstring says of it. FEniCSx is imported when a verb is
+called.
+"""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from importlib.util import find_spec
-from inspect import Signature, signature
+from inspect import Parameter, getdoc, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
-import typer
-
-from rotfem.commands.console import Session
-from rotfem.errors import ComputationError, InputError, SceneError, Stopped, input_of
+from rotfem.commands.console import Job, Session
+from rotfem.errors import ComputationError, SceneError, Stopped
+from rotfem.listeners import Hint, Progress, silent
+from rotfem.scene import Scene
+from rotfem.scene.scene import as_scene
 from rotfem.units import seconds_of, split_unit
-from rotfem.version import __version__
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from rotfem.commands.cost import CostResult
+    from rotfem.mechanics.effects import Work
+    from rotfem.mechanics.problem import Functional
+    from rotfem.results.campbell import CampbellResult
+    from rotfem.results.modes import ModesResult, ResponseResult
+    from rotfem.results.of_scene import CheckResult, ExplainResult
     from rotfem.results.result_set import Writer
+    from rotfem.results.run import RunResult
+    from rotfem.results.unbalance import UnbalanceResult
 
-app = typer.Typer(
-    name="rotfem",
-    help="Rotating beams and plates with FEniCSx. SCENE is a TOML file, described in docs/scene.md.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+F = TypeVar("F", bound=Callable[..., Any])
+AnyScene = Scene | str | Path | Mapping[str, Any]
 
+#: Name ↦ verb, in the order of the help.
+VERBS: dict[str, Callable[..., Any]] = {}
 
-def as_path(text: str) -> Path:
-    """Return the path that an option gives."""
-    if not text or "\0" in text:
-        raise typer.BadParameter("must be a path, not an empty text")
-    return Path(text)
+#: Keywords of a script alone.
+OF_SCRIPTS = ("comm", "session", "progress", "hint", "terms", "outputs")
+
+#: Defaults of common keywords that are not None, or False of a yes or no.
+DEFAULTS = {"plots": True, "hint": silent}
 
 
-#: Options that several commands have.
-SceneFile = Annotated[
-    Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
-]
-Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
-NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
-Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
+class Common(TypedDict, total=False):
+    """Keywords of all verbs on a scene.
+
+    Args:
+        folder: result folder; of a command results/<scene name>/<command>, of a script none.
+        plots: write figures into the folder.
+        report: write report.html, a page that shows all of it.
+        trust: let the scene run the Python files it names.
+        comm: MPI communicator; every rank gets the whole result.
+        session: of the command line, which prints.
+    """
+
+    folder: str | Path | None
+    plots: bool
+    report: bool
+    trust: bool
+    comm: MPI.Comm | None
+    session: Session | None
 
 
-def folder_option(default: str) -> Any:
-    """Return the option -o of a folder."""
-    return typer.Option("-o", "--output", metavar="DIR", parser=as_path, help=f"result folder [{default}]")
+class Computing(Common, total=False):
+    """Keywords of verbs that compute what a scene asks for.
+
+    Args:
+        accuracy: relative error wanted: the rest follows from it.
+        budget: CPU time that an accuracy may take: 60s, 2min, 1h.
+        hint: called with every line of advice before the computation starts; None asks for none.
+        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
+    """
+
+    accuracy: float | None
+    budget: float | str | None
+    hint: Hint | None
+    terms: Mapping[str, Work] | None
 
 
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", help="print the version", callback=lambda wanted: _version(wanted))
-    ] = False,
-    files: Annotated[
-        list[Path] | None,
-        typer.Option("--load", metavar="FILE", parser=as_path, help="Python file that registers what scenes name"),
-    ] = None,
-) -> None:
-    """Rotating beams and plates with FEniCSx."""
-    if files:
-        from rotfem.scene.extensions import load
-
-        with Session():
-            for path in files:
-                load(str(path), path, "command line", "--load")
+def verb(function: F) -> F:
+    """Make a verb of a function: its signature shows the common keywords, too."""
+    *own, last = signature(function).parameters.values()
+    shared = Computing if "Computing" in last.annotation else Common
+    kinds = {name: getattr(kind, "__forward_arg__", kind) for name, kind in shared.__annotations__.items()}
+    common = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=DEFAULTS.get(name, False if kind == "bool" else None))
+        for name, kind in kinds.items()
+    ]
+    common = [parameter.replace(annotation=kinds[parameter.name]) for parameter in common]
+    vars(function)["__signature__"] = signature(function).replace(parameters=[*own, *common])
+    VERBS[function.__name__] = function
+    return function
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"rotfem {__version__}")
-        raise typer.Exit
+def described(function: Callable[..., Any]) -> dict[str, str]:
+    """Return keyword of a verb ↦ what its docstring says of it."""
+    texts = [getdoc(part) or "" for part in (Common, Computing, function)]
+    found = [entry for text in texts for entry in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)]
+    return {name: " ".join(said.split()) for name, said in found}
 
 
-# --- what all verbs have in common ------------------------------------------------------------------------------------
+def asked(accuracy: float | None, budget: float | str | None, error: bool | str) -> dict[str, Any]:
+    """Return the changes of a scene that keywords ask for."""
+    given = {
+        "accuracy": accuracy,
+        "accuracy_budget": None if budget is None else seconds_of(budget, "command line", "--budget"),
+        "output.error": None if error else False,
+    }
+    return {key: value for key, value in given.items() if value is not None}
 
 
 @contextmanager
-def verb_on(
-    verb: str,
-    *,
-    scene: SceneFile,
-    output: Annotated[Path | None, folder_option("results/<scene name>/<command>")] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
-    ] = None,
-    accuracy: Annotated[
-        float | None, typer.Option("--accuracy", metavar="E", help="relative error wanted: the rest follows from it")
-    ] = None,
-    budget: Annotated[
-        str | None, typer.Option("--budget", metavar="TIME", help="that an accuracy may take: 60s, 2min, 1h")
-    ] = None,
-    as_json: Json = False,
-    no_error: Annotated[
-        bool, typer.Option("--no-error", help="estimate no errors, as output.error = false does")
-    ] = False,
-    no_plots: NoPlots = False,
-    report: Annotated[bool, typer.Option("--report", help="write report.html, a page that shows all of it")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help="let SCENE run the Python files it names")] = False,
-    no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> Iterator[Session]:
-    """Give a verb the session of its scene; these are, but for its name, the options of all verbs."""
-    from rotfem.scene import load_scene
-    from rotfem.scene.extensions import Untrusted
-
-    with Session(as_json, quiet, debug, no_plots) as session:
-        if verb == "check" and scene.is_dir():
-            from rotfem.results.result_set import read_summary, said_of
-
-            found(session, said_of(scene), read_summary(scene))
-        wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
-        if budget is not None:
-            wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
-        if no_error:
-            wanted.append("output.error=false")
-        changes = [*(overrides or ()), *wanted]
-        try:
-            loaded = load_scene(scene, changes, trust)
-        except Untrusted as error:
-            if not (sys.stdin.isatty() and sys.stderr.isatty()) or not typer.confirm(f"{error}\nRun it?", err=True):
-                raise
-            loaded = load_scene(scene, changes, True)
-        session.scene = loaded
-        modules = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
-        if absent := next((name for name in modules if find_spec(name) is None), ""):
-            lacking = f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"
-            if verb != "check":
-                raise InputError("", None, lacking)
-            found(session, f"{scene} is a valid scene; for more, {lacking}", {"command": "check", "name": loaded.name})
-        session.start(f"{loaded.name}: {verb}", loaded.output.speed)
-        if output is None and loaded.name in ("", ".", ".."):
-            raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{loaded.name}"')
-        import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
-
-        session.folder(output or Path("results", loaded.name, verb), verb, loaded.inputs)
-        session.hint = None if no_advice or quiet else session.advise
-        session.report = report
-        if report and find_spec("bokeh") is None:
-            raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")
-        try:
-            yield session
-        except (ComputationError, Stopped) as error:
-            if error.result is not None:
-                session.finish(error.result)
-            raise
-
-
-def found(session: Session, said: str, summary: dict[str, Any]) -> NoReturn:
-    """Say what `check` finds without a computation, and end it."""
-    session.print_json({**summary, "found": said})
-    session.say(said)
-    raise SystemExit(0)
-
-
-#: Options of verbs that compute what a scene asks for.
-OF_COMPUTING = ("accuracy", "budget", "no_error", "no_advice")
-
-
-def verb(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command of a function of a session and its own options: it has those of all verbs, too."""
-
-    def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        own = [p.replace(kind=p.KEYWORD_ONLY) for p in list(signature(work, eval_str=True).parameters.values())[1:]]
-        scene, *shared = list(signature(verb_on, eval_str=True).parameters.values())[1:]
-        shared = [p for p in shared if computes or p.name not in OF_COMPUTING]
-
-        def call(**given: Any) -> None:
-            options = {p.name: given.pop(p.name) for p in own}
-            with verb_on(work.__name__, **given) as session:
-                work(session, **options)
-
-        call.__name__, call.__doc__ = work.__name__, work.__doc__
-        vars(call)["__signature__"] = Signature([scene, *own, *shared])
-        app.command()(call)
-        return work
-
-    return decorate
+def begun(name: str, scene: AnyScene, common: Computing | Common, error: bool | str = True) -> Iterator[Job]:
+    """Give a verb its scene, with what its keywords change, and its folder, into which results of a failure go."""
+    given: Computing = {**common}
+    job: Job | None = given.get("session")
+    if job is None:
+        job = Job(given.get("comm"), given.get("plots", True), given.get("report", False))
+        job.scene = as_scene(scene, given.get("trust", False))
+        if changes := asked(given.get("accuracy"), given.get("budget"), error):
+            job.scene = job.scene.replace(changes)
+        if (folder := given.get("folder")) is not None:
+            job.open(Path(folder), name)
+    try:
+        yield job
+    except BaseException as failure:
+        if isinstance(failure, ComputationError | Stopped) and failure.result is not None:
+            job.finish(failure.result)
+        job.close(failure)
+        raise
+    job.close(None)
 
 
 # --- the verbs --------------------------------------------------------------------------------------------------------
 
 
-@verb()
+@verb
 def run(
-    session: Session,
-    checkpoint: Annotated[
-        str | None, typer.Option("--checkpoint", metavar="EVERY", help="write checkpoints: every 30s, or 500 steps")
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="go on from the checkpoint in the result folder")] = False,
-    error: Annotated[
-        str | None, typer.Option("--error", metavar="parts", help="errors of steps and mesh one by one")
-    ] = None,
-) -> None:
-    """Compute the steady state or the time history of SCENE."""
-    from rotfem.commands.run import simulate
-    from rotfem.commands.run_store import RunStore, interval
+    scene: AnyScene,
+    *,
+    checkpoint: str | int | None = None,
+    resume: bool = False,
+    error: bool | str = True,
+    progress: Progress | None = None,
+    outputs: Mapping[str, Functional] | None = None,
+    **common: Unpack[Computing],
+) -> RunResult:
+    """Compute the steady state or the time history of a scene.
 
-    if error not in (None, "parts"):
+    It is the steady state where the spin is constant and [time] absent.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        checkpoint: write checkpoints into the folder: every 30s, or 500 steps.
+        resume: go on from the checkpoint in the result folder.
+        error: estimate errors, as output.error has it; "parts": those of steps and mesh one by one.
+        progress: called with the share of the work done, between 0 and 1.
+        outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
+
+    Raises:
+        SceneError: the scene is not valid or cannot be run, or a checkpoint that is none of this run.
+        ComputationError: it failed; its attribute `result` holds what was computed until then.
+        OutputError: the folder cannot be written.
+    """
+    if error not in (True, False, "parts"):
         raise SceneError("command line", "--error", error, 'must be "parts"')
-    every = None if checkpoint is None else interval(checkpoint)
-    store = RunStore(session.comm, session.results, every, resume)
-    shown, parts = partial(session.finish, last=False), error is not None
-    session.finish(simulate(session.scene, store, session.bar, session.hint, shown=shown, parts=parts))
+    with begun("run", scene, common, error) as job:
+        from rotfem.commands.run import simulate
+        from rotfem.commands.run_store import RunStore, interval
+
+        store = RunStore(job.comm, job.results, None if checkpoint is None else interval(checkpoint), resume)
+        shown, parts, hint = partial(job.finish, last=False), error == "parts", common.get("hint", silent)
+        return job.finish(
+            simulate(job.scene, store, progress, hint, common.get("terms"), outputs, shown=shown, parts=parts)
+        )
 
 
-@verb()
+@verb
 def modes(
-    session: Session,
-    sensitivities: Annotated[
-        bool, typer.Option("--sensitivities", help="derivatives to section, hub and speed")
-    ] = False,
-    state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
-    matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
-    blade_tables: Annotated[
-        bool, typer.Option("--blade-tables", help="mode polynomials for ElastoDyn and a table of modes over the span")
-    ] = False,
-    participation: Annotated[bool, typer.Option("--participation", help="modal masses and effective masses")] = False,
-    animate: Annotated[
-        int | None, typer.Option("--animate", metavar="MODE", help="draw a mode in space: mode_N.gif")
-    ] = None,
-) -> None:
-    """Compute natural frequencies, damping and mode shapes of SCENE."""
-    from rotfem.commands.modes import modes as analyse
+    scene: AnyScene,
+    *,
+    speed: float | str | None = None,
+    sensitivities: bool = False,
+    state_space: bool = False,
+    matrices: bool = False,
+    blade_tables: bool = False,
+    participation: bool = False,
+    animate: int | None = None,
+    error: bool = True,
+    **common: Unpack[Computing],
+) -> ModesResult:
+    """Compute natural frequencies, damping and mode shapes of a scene.
 
-    count = session.scene.modes.count
-    if animate is not None and not 1 <= animate <= count:
-        raise SceneError("command line", "--animate", animate, f"must be from 1 to modes.count, {count}")
-    result = analyse(
-        session.scene,
-        sensitivities=sensitivities,
-        blade_tables=blade_tables,
-        participation=participation,
-        comm=session.comm,
-        hint=session.hint,
-    )
-    further: list[Writer] = []
-    if state_space or matrices:
-        from rotfem.analysis.state_space import serial, write_matrices
-        from rotfem.analysis.state_space import state_space as reduce
+    They are those at its final speed: that of a spin-up, at the end of [time], or the constant one.
 
-        with input_of(session.scene.file):
-            if state_space:
-                model = reduce(result.analysis, result.spinning, session.scene.modes.count)
-                further.append(lambda folder: model.write(folder / "state_space.npz"))
-            if matrices:
-                serial(result.analysis, "the export of matrices")
-                further.append(lambda folder: write_matrices(result.analysis, result.spinning, folder))
-    if animate is not None:
-        from rotfem.results.surfaces import animate as draw
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        speed: of the hub, in the place of the final one, rad/s or as 12.1rpm.
+        sensitivities: derivatives of all eigenvalues to section, hub and speed.
+        state_space: write the modal model state_space.npz into the folder.
+        matrices: write M, C, K as Matrix Market and npz into the folder.
+        blade_tables: mode polynomials for ElastoDyn and a table of modes over the span.
+        participation: modal masses and effective masses (see `rotfem.analysis.modal`).
+        animate: number of a mode to draw in space, mode_N.gif in the folder.
+        error: estimate errors, as output.error has it.
 
-        further.append(lambda folder: draw(result, animate, folder))
-    session.finish(result, further)
+    Raises:
+        SceneError: the scene is not valid.
+        ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
+    """
+    with begun("modes", scene, common, error) as job:
+        from rotfem.commands.modes import analysed, at_speed
+
+        if speed is not None:
+            job.scene = at_speed(job.scene, listed("--speed", speed, 1)[0])
+        count = job.scene.modes.count
+        if animate is not None and not 1 <= animate <= count:
+            raise SceneError("command line", "--animate", animate, f"must be from 1 to modes.count, {count}")
+        hint, terms = common.get("hint", silent), common.get("terms")
+        result = analysed(job.scene, job.comm, sensitivities, blade_tables, participation, hint, terms)
+        further: list[Writer] = []
+        if job.results is not None and (state_space or matrices):
+            from rotfem.commands.modes import models
+
+            further += models(job.scene, result, state_space, matrices)
+        if animate is not None:
+            from rotfem.results.surfaces import animate as draw
+
+            further.append(lambda folder: draw(result, animate, folder))
+        return job.finish(result, further)
 
 
-@verb()
+@verb
 def campbell(
-    session: Session,
-    speeds: Annotated[
-        str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s, or as 0:15:31rpm")
-    ],
-    per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="lines 1Ω … NΩ to cross")] = None,
-    orders: Annotated[str | None, typer.Option("--orders", metavar="K,…", help="lines kΩ to cross: 1,3,6,9")] = None,
-    rated: Annotated[str | None, typer.Option("--rated", metavar="SPEED", help="rated speed to mark: 12.1rpm")] = None,
-    operating: Annotated[
-        str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range to mark: 6.9:12.1rpm")
-    ] = None,
-    only: Annotated[
-        bool, typer.Option("--only", help="solve no other speeds; critical speeds are interpolated between them")
-    ] = False,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            "--map", metavar="KEY=RANGE", help="critical speeds over structure.supports.*.stiffness=1e6:1e9:20"
-        ),
-    ] = None,
-) -> None:
-    """Compute the Campbell diagram and critical speeds of SCENE.
+    scene: AnyScene,
+    speeds: Sequence[float] | str,
+    *,
+    per_rev: int | None = None,
+    orders: int | Sequence[int] | str | None = None,
+    rated: float | str | None = None,
+    operating: Sequence[float | str] | str | None = None,
+    only: bool = False,
+    map: Mapping[str, Sequence[float]] | str | None = None,
+    error: bool = True,
+    progress: Progress | None = None,
+    **common: Unpack[Computing],
+) -> CampbellResult:
+    """Compute the Campbell diagram and critical speeds of a scene.
 
-    Of one that was interrupted the finished speeds are kept; the same command goes on from there.
+    Its own speed is not used. Of a diagram that was interrupted the finished speeds are kept in the folder; the same
+    command goes on from there.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        speeds: first:last:number or s1,s2,… in rad/s, or as 0:15:31rpm; increasing.
+        per_rev: number of the lines 1Ω … NΩ to cross.
+        orders: k of the lines kΩ to cross, as 1,3,6,9, in a script their number, too; by default those of the scene, or
+            as many as meet a branch in the range, at most 4.
+        rated: rated speed to mark, rad/s or as 12.1rpm.
+        operating: operating range to mark, as 6.9:12.1rpm.
+        only: solve no other speeds; critical speeds are interpolated between them.
+        map: critical speeds over a scene key, as structure.supports.*.stiffness=1e6:1e9:20, spaced evenly on a
+            logarithmic scale: the synchronous ones of a shaft, without damping and unsymmetric stiffnesses.
+        error: estimate errors, as output.error has it.
+        progress: called with the share of the speeds done, between 0 and 1.
+
+    Raises:
+        SceneError: the scene or the speeds are not valid.
+        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check; its attribute `result` holds
+            the diagram of the speeds before it.
+        Stopped: it was interrupted; likewise.
     """
-    from rotfem.commands.campbell import campbell as sweep
+    if isinstance(rated, str):
+        (rated,) = listed("--rated", rated, 1)
+    if isinstance(orders, str):
+        orders = listed("--orders", orders, kind=int)
+    with begun("campbell", scene, common, error) as job:
+        from rotfem.commands.campbell import campbell_of
 
-    result = sweep(
-        session.scene,
-        speeds,
-        comm=session.comm,
-        orders=per_rev if orders is None else listed("--orders", orders, int),
-        rated=None if rated is None else listed("--rated", rated, float, 1)[0],
-        operating=None if operating is None else listed("--operating", operating.replace(":", ","), float, 2),
-        only=only,
-        map=over,
-        folder=session.results.path,
-        progress=session.bar,
-        hint=session.hint,
-    )
-    session.finish(result)
+        number = per_rev if orders is None else orders
+        marks = {
+            "modes.orders": list(range(1, 1 + number)) if isinstance(number, int) else number,
+            "modes.rated": rated,
+            "modes.operating": ranged(operating),
+        }
+        kept = None if job.results is None else job.results.path
+        hint, terms = common.get("hint", silent), common.get("terms")
+        return job.finish(campbell_of(job.scene, speeds, marks, only, map, job.comm, kept, progress, hint, terms))
 
 
-@verb(computes=False)
+@verb
 def response(
-    session: Session,
-    low: Annotated[
-        str | None,
-        typer.Option(
-            "--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0, or half a free hub's first]"
-        ),
-    ] = None,
-    high: Annotated[
-        str | None, typer.Option("--to", metavar="FREQUENCY", help="highest [beyond the highest of modes.count]")
-    ] = None,
-    number: Annotated[int, typer.Option("--number", help="frequencies, those that show peaks on top")] = 200,
-    per_rev: Annotated[str | None, typer.Option("--per-rev", metavar="K,…", help="multiples of the speed")] = None,
-) -> None:
-    """Compute amplitudes and phases of SCENE under harmonic loads."""
-    from rotfem.commands.response import response as answers
+    scene: AnyScene,
+    low: float | str | None = None,
+    high: float | str | None = None,
+    *,
+    number: int = 200,
+    per_rev: Sequence[float] | str = (),
+    **common: Unpack[Common],
+) -> ResponseResult:
+    """Compute amplitudes and phases of a scene under harmonic loads.
 
-    orders = () if per_rev is None else listed("--per-rev", per_rev)
-    result = answers(session.scene, low, high, number=number, per_rev=orders, comm=session.comm)
-    session.finish(result)
+    Args:
+        scene: scene, path of a scene file, or nested tables; of its first `modes.count` modes the peaks are resolved.
+        low: lowest frequency, rad/s or with a unit as 0.1Hz; by default 0, or half a free hub's first.
+        high: highest frequency; by default beyond the highest of modes.count.
+        number: of frequencies, at equal distances; those that show peaks and smooth curves come on top.
+        per_rev: multiples of the speed, as 1,2,3: frequencies that are taken alone without lowest and highest.
+
+    Raises:
+        SceneError: the scene is not valid, or has no harmonic load, no steady state or a free hub.
+        ComputationError: no equilibrium, eigenpairs that fail their check, or a frequency of a mode without damping.
+    """
+    lines = listed("--per-rev", per_rev) if isinstance(per_rev, str) else per_rev
+    with begun("response", scene, common) as job:
+        from rotfem.commands.response import response_of
+
+        return job.finish(response_of(job.scene, low, high, number, lines, job.comm))
 
 
-@verb(computes=False)
+@verb
 def unbalance(
-    session: Session,
-    speeds: Annotated[
-        str, typer.Option("--speeds", metavar="RANGE", help="first:last:number in rad/s, or as 0:12000:200rpm")
-    ],
-    probe: Annotated[
-        list[str] | None,
-        typer.Option("--probe", metavar="X:ANGLE", help="a probe: place (m) and angle (°), repeatable"),
-    ] = None,
-    operating: Annotated[
-        str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range: 3000:3600rpm")
-    ] = None,
-) -> None:
-    """Compute the whirl of a shaft, SCENE, under its unbalances."""
-    from rotfem.commands.unbalance import probe_of
-    from rotfem.commands.unbalance import unbalance as answers
+    scene: AnyScene,
+    speeds: Sequence[float] | str,
+    *,
+    probes: Sequence[tuple[float, float] | str] = (),
+    operating: Sequence[float | str] | str | None = None,
+    **common: Unpack[Common],
+) -> UnbalanceResult:
+    """Compute the whirl of a shaft, a scene, under its unbalances.
 
-    result = answers(
-        session.scene,
-        speeds,
-        probes=[probe_of(text) for text in probe or ()],
-        operating=None if operating is None else listed("--operating", operating.replace(":", ","), float, 2),
-        comm=session.comm,
-    )
-    session.finish(result)
+    It is that over the speed. Peaks are sought between the speeds. Their amplification factor is N_c/(N₂ − N₁), N₁ and
+    N₂ the speeds at which the larger semi-axis is 0.707 of that at the peak N_c; the separation margin is the distance
+    of N_c from the operating range, in parts of the nearer end of it (API 617, 8th edition, 1-2.6).
 
+    Args:
+        scene: scene, path of a scene file, or nested tables; its unbalances are `loads.unbalance` and masses off
+            the axis.
+        speeds: first:last:number in rad/s, or as 0:12000:200rpm; increasing.
+        probes: a probe x:angle, place (m) and angle (°) from direction 2 towards 3; in a script pairs in m and rad.
+        operating: operating range, as 3000:3600rpm.
 
-@verb(computes=False)
-def check(session: Session) -> None:
-    """Show mass, centre of mass and inertias of SCENE, and draw it.
-
-    No motion is computed. Of a result folder it says how the computation ended.
+    Raises:
+        SceneError: the scene is not valid, is no round shaft, or has no unbalance.
+        ComputationError: no equilibrium.
     """
-    from rotfem.commands.check import check as weigh
+    with begun("unbalance", scene, common) as job:
+        from rotfem.commands.unbalance import probe_of, whirl
 
-    session.finish(weigh(session.scene, comm=session.comm))
+        looking = [probe_of(probe) if isinstance(probe, str) else probe for probe in probes]
+        return job.finish(whirl(job.scene, speeds, looking, ranged(operating), job.comm))
 
 
-@verb(computes=False)
+@verb
+def check(scene: AnyScene, **common: Unpack[Common]) -> CheckResult:
+    """Show mass, centre of mass and inertias of a scene, and draw it.
+
+    No motion is computed. Of a result folder the command says how the computation ended. Integrals are those of the
+    bodies that the equations are made of, on the scene's mesh, with all mass that there is.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+
+    Raises:
+        SceneError: the scene is not valid, or a mesh or a section that cannot be computed with.
+    """
+    with begun("check", scene, common) as job:
+        from rotfem.commands.check import weighed
+
+        return job.finish(weighed(job.scene, job.comm))
+
+
+@verb
 def explain(
-    session: Session,
-    accuracy: Annotated[
-        float | None, typer.Option("--accuracy", help="that the model of --write is for, 1e-2 by default")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the scene with what it needs")
-    ] = None,
-) -> None:
-    """Show how much each effect and each theory changes in SCENE.
+    scene: AnyScene,
+    *,
+    accuracy: float | None = None,
+    write: str | Path | None = None,
+    progress: Progress | None = None,
+    terms: Mapping[str, Work] | None = None,
+    **common: Unpack[Common],
+) -> ExplainResult:
+    """Show how much each effect and each theory changes in a scene.
 
-    Its last line names those that the scene calls for.
+    It ends with the model that the scene calls for.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        accuracy: relative error that the model is for, 1e-2 by default.
+        write: file that the scene is written to with what it needs.
+        progress: called with the share of the work done, between 0 and 1.
+        terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
+
+    Raises:
+        SceneError: the scene is not valid.
     """
-    from rotfem.accuracy.tuned import write_variant
-    from rotfem.commands.explain import explain as estimate
+    with begun("explain", scene, common) as job:
+        from rotfem.commands.explain import explained
 
-    if write is not None:
-        session.check_writable("--write", write, session.scene.inputs)
-    scene = session.scene if accuracy is None else session.scene.replace({"accuracy": accuracy})
-    result = estimate(scene, comm=session.comm, progress=session.bar)
-    session.finish(result)
-    if write is not None and session.first:
-        within = result.summary["needed"]["accuracy"]
-        remark = f"# {session.scene.name} with the theory and the effects that it needs for {within:g}.\n\n"
-        write_variant(session.scene, result.needed, write, remark)
-        session.say(f"scene with what it needs in {write}")
+        job.check_writable("--write", write, job.scene.inputs)
+        given = job.scene if accuracy is None else job.scene.replace({"accuracy": accuracy})
+        result = job.finish(explained(given, job.comm, progress, terms))
+        if write is not None and job.first:
+            within = result.summary["needed"]["accuracy"]
+            remark = f"# {given.name} with the theory and the effects that it needs for {within:g}.\n\n"
+            job.scene.replace(result.needed).write(write, remark)
+            job.say(f"scene with what it needs in {write}")
+        return result
 
 
-@verb(computes=False)
+@verb
 def cost(
-    session: Session,
-    quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
-    accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
-    write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the tuned scene there")
-    ] = None,
-    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip, frequencies or campbell")] = None,
-    theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
-    schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
-    budget: Annotated[str | None, typer.Option("--budget", metavar="TIME", help="of the study: 60s, 2min, 1h")] = None,
-) -> None:
-    """Measure error against computing time of SCENE over settings.
+    scene: AnyScene,
+    *,
+    quick: bool = False,
+    accuracy: float = 1e-4,
+    write: str | Path | None = None,
+    of: str | None = None,
+    theories: Sequence[str] | str | None = None,
+    schemes: Sequence[str] | str | None = None,
+    budget: float | str | None = None,
+    progress: Progress | None = None,
+    **common: Unpack[Common],
+) -> CostResult:
+    """Measure error against computing time of a scene over settings.
 
     Each theory and scheme has a ladder of settings, each about twice as dear as the last.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        quick: few theories, and the scheme of the reference and the scene's own.
+        accuracy: relative error, that of the model included, for which a setting is recommended.
+        write: file that the scene is written to with that setting.
+        of: tip (displacements, relative to the largest), frequencies (eigenvalues, each relative to itself) or campbell
+            (eigenvalues at nine speeds from rest to the scene's); by default what the scene computes.
+        theories: those to try, as A,B; by default those that the structure has.
+        schemes: time-stepping schemes to try, as A,B; by default all.
+        budget: CPU time of the study, s, or as 60s, 2min; two minutes for a quick one, else twenty.
+        progress: called with the share of the work done, between 0 and 1.
+
+    Raises:
+        SceneError: the scene, or a choice, is not valid.
+        ComputationError: not one setting could be computed.
+        Stopped: it was interrupted; its attribute `result` holds what was measured.
     """
-    from rotfem.commands.cost import cost as study
+    with begun("cost", scene, common) as job:
+        from rotfem.commands.cost import studied
 
-    if write is not None:
-        session.check_writable("--write", write, session.scene.inputs)
-    result = study(
-        session.scene,
-        quick=quick,
-        accuracy=accuracy,
-        output=of,
-        budget=budget,
-        theories=None if theories is None else theories.split(","),
-        schemes=None if schemes is None else schemes.split(","),
-        comm=session.comm,
-        progress=session.bar,
-    )
-    session.finish(result)
-    if result.summary["recommended"] is None:
-        raise result.missed()
-    if write is not None and session.first:
-        result.write_tuned(write)
-        session.say(f"tuned scene in {write}")
+        job.check_writable("--write", write, job.scene.inputs)
+        few, ways = (x.split(",") if isinstance(x, str) else x for x in (theories, schemes))
+        result = job.finish(studied(job.scene, quick, accuracy, of, budget, few, ways, job.comm, progress))
+        if write is not None and job.first and result.summary["recommended"] is not None:
+            result.write_tuned(write)
+            job.say(f"tuned scene in {write}")
+        return result
 
 
-def listed(option: str, text: str, kind: type[int] | type[float] = float, count: int | None = None) -> list[Any]:
+def listed(
+    option: str, given: float | str, count: int | None = None, kind: type[int] | type[float] = float
+) -> list[Any]:
     """Return the numbers of an option such as "1,2" or, in rad/s, "6.9,12.1rpm"."""
     with suppress(ValueError):
-        numbers, unit = split_unit(text)
+        numbers, unit = split_unit(str(given))
         found = [kind(part) * kind(unit) for part in numbers.split(",")]
         if count in (None, len(found)):
             return found
     what = {1: "a speed, rad/s or as 12.1rpm", 2: "two speeds low:high, rad/s or as 6.9:12.1rpm"}
-    raise SceneError("command line", option, text, f"must be {what.get(count or 0, 'numbers separated by commas')}")
+    raise SceneError("command line", option, given, f"must be {what.get(count or 0, 'numbers separated by commas')}")
+
+
+def ranged(operating: Sequence[float | str] | str | None) -> Any:
+    """Return an operating range as two numbers (rad/s), or as it is where it is no text."""
+    return listed("--operating", operating.replace(":", ","), 2) if isinstance(operating, str) else operating

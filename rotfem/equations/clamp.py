@@ -70,7 +70,7 @@ class RootReaction:
 
     def __init__(self, structure: Structure):
         self._structure = structure
-        self.point, data = self._middle(), structure.data
+        self.point, data = structure.clamp_middle(), structure.data
         self.place = self.point + np.asarray(getattr(data, "root_position", (data.hub_radius, 0.0, 0.0)))
         space = structure.V.dofmap
         owned = space.index_map.size_local
@@ -113,15 +113,6 @@ class RootReaction:
                 elif unknown in ("u1", "u2", "u3"):
                     column[:] = moved[:, int(unknown[1]) - 1]
         return out.reshape(values.size, len(self.names))
-
-    def _middle(self) -> Array:
-        """Return the middle of what is clamped, of edges weighed by their length, (3,) in m."""
-        grid = getattr(self._structure, "grid", None)
-        if grid is None:
-            return np.zeros(3)
-        ends = grid.ends("clamped")
-        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        return np.asarray(lengths @ ends.mean(axis=1) / lengths.sum())
 
 
 # --- of a linear theory ----------------------------------------------------------------------------------------------

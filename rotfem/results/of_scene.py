@@ -109,7 +109,9 @@ def check_figure(result: CheckResult) -> Figure:
     for spot, i, j in () if of_shaft else ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2)):
         axis = figure.add_subplot(spot)
         axis.triplot(points[:, i], points[:, j], result.surface.triangles, lw=0.3, color="0.4")
-        axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
+        axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3", label="centre of mass")
+        if j == 1:
+            axis.legend(fontsize=7, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
         dress(axis, f"axis {i + 1} (m)", f"axis {j + 1} (m)")
         if (i, j) == (1, 2):  # the angles of sections are what they are
             axis.set_aspect("equal", adjustable="datalim")
@@ -118,7 +120,8 @@ def check_figure(result: CheckResult) -> Figure:
         for name, dashes in zip(names, ("-", "--", ":", "-."), strict=False):  # equal ones lie on each other
             values = np.degrees(columns[name]) if name == "pretwist" else columns[name]
             axis.plot(columns["x"], values, lw=1.3, ls=dashes, label=name)
-        if logarithmic and all(np.all(columns[name] > 0.0) for name in names):
+        found = np.concatenate([columns[name] for name in names])
+        if logarithmic and np.max(found) > 10.0 * np.min(found) > 0.0:
             axis.set_yscale("log")
         last = row == len(panels) + 1
         axis.set_xlim(columns["x"][0], columns["x"][-1])
@@ -225,7 +228,7 @@ def explain_figure(result: ExplainResult) -> Figure:
                 axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
             if not np.isfinite(value):
                 axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
-    axis.axvline(1e-2, color="0.4", lw=0.8, ls="--")
+    axis.axvline(1e-2, color="0.4", lw=0.8, ls="--", label="1 %, noticeable")
     axis.set_xscale("log")
     axis.set_xlim(left, right)
     names = [f"{'without' if row['included'] else 'with'} {row['name']}" for row in rows]

@@ -102,14 +102,19 @@ def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
 
 
 def stacked(
-    x: str, at: Array, columns: Mapping[str, Array], title: str, units: Mapping[str, str] | None = None
+    x: str,
+    at: Array,
+    columns: Mapping[str, Array],
+    title: str,
+    units: Mapping[str, str] | None = None,
+    below: float = 0.0,
 ) -> Figure:
     """Return one panel a column, or columns (n, m), over the abscissa x, with marks where it is a position.
 
-    `units` has those that are not the usual ones.
+    `units` has those that are not the usual ones; `below` is room for a legend, inch.
     """
     units, (shown, title) = units or {}, not_zero(columns, title)
-    figure, panels = panels_over(label(x), len(shown), title)
+    figure, panels = panels_over(label(x), len(shown), title, below=below)
     for panel, name in zip(panels, shown, strict=True):
         panel.plot(at, columns[name], lw=1.0 if x == "t" else 1.2, marker="" if x == "t" else ".", ms=4)
         caption(panel, described(name)[0])
@@ -154,8 +159,10 @@ def stations_figure(result: RunResult) -> Figure:
     values = {name: v for name, v in stations.values.items() if not name.startswith(("gamma", "kappa"))}
     if len(stations.t) < 2:
         return stacked("x", stations.x, {name: v[-1] for name, v in values.items()}, title)
-    title += f", X from {stations.x[0]:g} m (blue) to {stations.x[-1]:g} m"
-    return stacked("t", stations.t, values, title)
+    figure = stacked("t", stations.t, values, title, below=0.3)
+    lines, said = figure.axes[0].lines, [f"X = {x:g} m" for x in stations.x] if figure.axes else []
+    figure.legend(lines[:8], said[:8], loc="lower center", ncols=8, fontsize=8, frameon=False)
+    return figure
 
 
 # --- small motions ----------------------------------------------------------------------------------------------------

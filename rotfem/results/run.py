@@ -95,7 +95,11 @@ class RunResult(Result):
 
     @property
     def figures(self) -> dict[str, float]:
-        """Figures of merit: of every tip component smallest and largest value, their times, and the last value."""
+        """Figures of merit: smallest and largest value of every component of tip and root, their times, the last value.
+
+        A free hub has them of `psi`, `psi_dot` and `torque`, too, and where its torque ends before the history, at
+        `torque_end` (s), the residual vibration of the tip, `tip_u2_residual`: half of its range from then on (m).
+        """
         return dict(self.summary["figures"])
 
     @property
@@ -135,7 +139,7 @@ class RunResult(Result):
         return {f"{name}.png": f"results.plots:{draw[name]}_figure" for name, drawn in there.items() if drawn}
 
     def tables(self) -> list[ShortTable]:
-        """Return extremes and last values of the tip's displacement; of a steady state all of tip and root."""
+        """Return extremes and last values of the tip's displacement and of a free hub, of a steady state all values."""
         found = self.figures
         ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
         if self.steady:
@@ -145,18 +149,19 @@ class RunResult(Result):
                     (f"{self.frame} frame", "value"), [(named(name), number(ends[name], scales[name])) for name in ends]
                 )
             ]
-        tips = [name for name in ends if name.startswith("tip_u") and f"{name}_min" in found]
-        scale = largest(found[f"{name}_{end}"] for name in tips for end in ("min", "max"))
-        rows = []
-        for name in tips:
-            low, high, last = (number(found[f"{name}_{end}"], scale) for end in ("min", "max", "final"))
+        shown = [name for name in ends if name.startswith(("tip_u", *HUB)) and f"{name}_min" in found]
+        scales = by_unit({name: largest(found[f"{name}_{end}"] for end in ("min", "max")) for name in shown})
+        head, rows = [f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"], []
+        for name in shown:
+            low, high, last = (number(found[f"{name}_{end}"], scales[name]) for end in ("min", "max", "final"))
             when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
-            rows.append((named(name), low, when[0], high, when[1], last))
-        return (
-            [ShortTable((f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)]
-            if rows
-            else []
-        )
+            residual = found.get(f"{name}_residual")
+            rows.append(
+                (named(name), low, when[0], high, when[1], last, *([] if residual is None else [f"{residual:.6g}"]))
+            )
+        if "torque_end" in found:
+            head.append(f"± after {found['torque_end']:.6g} s")
+        return [ShortTable(tuple(head), rows)] if rows else []
 
     def arrays(self) -> Variables:
         """Return the history over `t` (s), and shape and resultants over `node`, of a plate with its `triangles`."""
@@ -164,16 +169,25 @@ class RunResult(Result):
         return out if self.triangles is None else out | {"triangles": (("triangle", "corner"), self.triangles)}
 
 
+#: Columns of a history that say how a free hub turns.
+HUB = ("psi", "psi_dot", "torque")
+
+
 def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit: extremes of tip, root and supports, with times, final values, Jacobi drift.
+    """Return the figures of merit (see `RunResult.figures`), with those of supports and the Jacobi drift.
 
     Extremes inside the history are those of the parabola through three neighbouring samples.
     """
     out: dict[str, float] = {}
-    t = history["t"]
+    t, free = history["t"], "torque" in history
     if len(t) == 0:
         return out
-    for name in [n for n in history if n.startswith(("tip_", "root_", "support_"))]:
+    pushed = np.flatnonzero(history["torque"] if free else np.zeros(0))
+    if len(pushed) and (after := pushed[-1] + 1) < len(t) - 1:
+        out["torque_end"] = t[after]
+        for name in (n for n in history if n.startswith("tip_u")):
+            out[f"{name}_residual"] = np.ptp(history[name][after:]) / 2
+    for name in [n for n in history if n.startswith(("tip_", "root_", "support_")) or (free and n in HUB)]:
         out[f"{name}_final"] = history[name][-1]
         if len(t) > 1:
             out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
@@ -187,7 +201,7 @@ def figures(history: dict[str, Array]) -> dict[str, float]:
 def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
     """Return (time, value) of the largest sign·y, by a parabola through the largest sample and its neighbours."""
     i = int(np.argmax(sign * y))
-    if i in (0, len(y) - 1):
+    if i in (0, len(y) - 1) or y[i] in (y[i - 1], y[i + 1]):  # at an end, or where a torque jumps
         return float(t[i]), float(y[i])
     c = np.polyfit(t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2], 2)
     if c[0] * sign >= 0:

@@ -1,8 +1,9 @@
-"""Surfaces that modes move, and animations of them by PyVista.
+"""Surfaces of structures, which modes and histories move, and animations of modes by PyVista.
 
 A surface is the mid-surface of a plate, or a beam as wide and as thick as its sections.
 
-A point of a section follows its centre and turns with it: u + θ × r, r from the centre to the point.
+A point of a section follows its centre and turns with it: u + θ × r in a mode, r from the centre to the point, and
+u + exp(θ) r − r in a history.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Surface:
     Attributes:
         points: where its points are in the frame, (k, 3), m.
         triangles: numbers of points, (m, 3).
-        nodes: for each point the node of a mode shape that carries it, (k,).
+        nodes: for each point the node of the structure that carries it, (k,).
         arms: from there to the point, (k, 3), m.
         length: of the structure, by which rotations of shapes are multiplied, m.
     """
@@ -67,14 +68,23 @@ class Surface:
 
     def moved(self, shape: Mapping[str, Array]) -> Array:
         """Return the complex displacements (k, 3) of the points in a mode (columns of `ModesResult.shapes`)."""
-        zero = np.zeros(len(shape["x"]))
+        whole = {name: real + 1j * shape.get(f"{name}_imag", 0.0) for name, real in shape.items()}
+        u, turns = self._at_points(whole)
+        return np.asarray(u + np.cross(turns / self.length, self.arms))
 
-        def vector(names: tuple[str, str, str]) -> Array:
-            parts = [shape.get(n, zero) + 1j * shape.get(f"{n}_imag", zero) for n in names]
-            return np.column_stack(parts)[self.nodes]
+    def displaced(self, columns: Mapping[str, Array]) -> Array:
+        """Return the displacements (k, 3), m, of the points by components at the nodes: u1, … (m), theta1, … (rad)."""
+        from scipy.spatial.transform import Rotation  # slow to load
 
-        turns = vector(("theta1", "theta2", "theta3" if "theta3" in shape else "alpha")) / self.length
-        return np.asarray(vector(("u1", "u2", "u3")) + np.cross(turns, self.arms))
+        u, turns = self._at_points(columns)
+        return np.asarray(u + Rotation.from_rotvec(turns).apply(self.arms) - self.arms)
+
+    def _at_points(self, columns: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Return displacements and rotations (k, 3) of what carries the points."""
+        names = ("u1", "u2", "u3"), ("theta1", "theta2", "theta3" if "theta3" in columns else "alpha")
+        zero = np.zeros_like(columns["u1"])
+        u, turns = (np.column_stack([columns.get(name, zero) for name in of])[self.nodes] for of in names)
+        return u, turns
 
 
 # --- animations -------------------------------------------------------------------------------------------------------

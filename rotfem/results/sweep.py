@@ -116,5 +116,6 @@ def sweep_figure(result: SweepResult) -> Figure:
         dress(axis, first if axis is axes[-1] else "", label_of(name), size=None)
     if others:
         handles, said = axes[0].get_legend_handles_labels()
-        figure.legend(handles[:12], said[:12], loc="outside upper center", ncols=3, frameon=False, fontsize=8)
+        across = max(1, 120 // (6 + max(map(len, said))))  # the figure is 120 letters wide
+        figure.legend(handles[:12], said[:12], loc="outside upper center", ncols=across, frameon=False, fontsize=8)
     return figure

@@ -330,10 +330,14 @@ class SpatialBeamStructure(BeamStructure):
         """Whether it is straight, the same in all directions about its axis but for unbalance, and no support turns."""
         if not self.is_straight or self.hinges or self.pitches or any(s.frame == "rotating" for s in self.supports):
             return False
+        return self.has_round_sections and all(same_about_axis(body.inertia_matrix) for body in self.bodies.values())
+
+    @property
+    def has_round_sections(self) -> bool:
+        """Whether all sections are the same in all directions about the axis."""
         places = np.union1d(self.section.knots, self.length)
         places = np.union1d(places, (places[1:] + places[:-1]) / 2)
-        bodies = (body.inertia_matrix for body in self.bodies.values())
-        return all(map(same_about_axis, (*self.section.at(places).values(), *bodies)))
+        return all(map(same_about_axis, self.section.at(places).values()))
 
     @property
     def has_tip_mass(self) -> bool:

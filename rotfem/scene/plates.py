@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy.typing as npt
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
-from rotfem.scene.table import Way, along, choose_way, empty, problem, problems_at, unit
+from rotfem.scene.table import SceneModel, Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
     Array,
     NonNegative,
@@ -36,13 +36,50 @@ Thickness = Annotated[
 Modulus = Annotated[Positive, unit("Pa")]
 
 
+def _as_edge(value: Any) -> Any:
+    return {"kind": value} if isinstance(value, str) else value
+
+
+class EdgeTable(SceneModel):
+    """How an edge of a plate is held; in a scene a kind alone may stand for it.
+
+    Attributes:
+        kind: "clamped"; "simply_supported", whose directors do not tilt along the edge either; "simply_supported_soft",
+            whose do; "symmetric", the middle of a plate that moves alike on both sides; "elastic", on springs; "free".
+        in_plane: whether displacements in the plane are zero: "held" by default where the deflection is zero.
+        stiffness: of a spring against the deflection (N/m per length, N/m²).
+        rotation: of a spring against turns about the edge (N·m/rad per length, N/rad).
+    """
+
+    kind: Literal["clamped", "simply_supported", "simply_supported_soft", "symmetric", "elastic", "free"]
+    in_plane: Literal["held", "free"] | None = None
+    stiffness: Annotated[NonNegative, unit("N/m**2")] = 0.0
+    rotation: Annotated[NonNegative, unit("N/rad")] = 0.0
+
+    @property
+    def held_in_plane(self) -> bool:
+        """Whether displacements in the plane are zero."""
+        return self.in_plane == "held" or (self.in_plane is None and self.kind not in ("symmetric", "elastic", "free"))
+
+    def _check(self) -> None:
+        for key in ("stiffness", "rotation"):
+            if getattr(self, key) > 0.0 and self.kind != "elastic":
+                raise problem(key, getattr(self, key), 'has a meaning with kind = "elastic" only')
+        if self.kind == "elastic" and not (self.stiffness or self.rotation):
+            raise problem("stiffness", None, 'missing; kind = "elastic" needs it, or rotation')
+        if self.kind in ("symmetric", "free") and self.in_plane is not None:
+            raise problem("in_plane", self.in_plane, f'has no meaning with kind = "{self.kind}"')
+
+
 class PlateStructure(StructureTable):
-    """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
+    """A plate in the plane (1, 2) of the rotating frame: a rectangle 0 ≤ x ≤ length, |y| ≤ width/2, or a mesh file.
 
     Attributes:
         length: side along x (m); None with a mesh.
         width: side along y (m); None with a mesh.
-        mesh: path of a gmsh file with the physical groups "clamped" and "plate", or None.
+        mesh: path of a gmsh file with the physical surface "plate" and physical curves, or None.
+        edges: named edge → how it is held. A rectangle has clamped, tip, lower and upper, a mesh its physical curves;
+            one that is called "clamped" is clamped unless it is said otherwise, the others are free.
         thickness: number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
         E: Young's modulus (Pa), isotropic.
         nu: Poisson's ratio, isotropic.
@@ -55,6 +92,7 @@ class PlateStructure(StructureTable):
         hub_radius: distance of the clamped edge from the origin of the frame along direction 1 (m).
         hub_offset: position of the plate's origin in the frame (m), instead of the hub radius; None if not given.
         point_masses: rows (x, y, m) in m, m, kg.
+        point_supports: rows (x, y, stiffness) in m, m, N/m, of springs against the deflection.
         line_masses: named edge → mass per length (kg/m); a rectangle has clamped, tip, lower and upper.
         damping: damping coefficients.
     """
@@ -78,11 +116,13 @@ class PlateStructure(StructureTable):
     G12: Modulus | None = None
     G13: Modulus | None = None
     G23: Modulus | None = None
-    rho: Annotated[Positive, unit("kg/m**3")]
+    rho: Annotated[NonNegative, unit("kg/m**3")]
     shear_correction: ShearCorrection = 5.0 / 6.0
     hub_radius: Annotated[NonNegative, unit("m")] = 0.0
     hub_offset: Annotated[Vector, unit("m")] | None = None
+    edges: dict[str, Annotated[EdgeTable, BeforeValidator(_as_edge)]] = Field(default_factory=dict)
     point_masses: Annotated[tuple[tuple[Number, Number, Positive], ...], unit("m", "m", "kg")] = ()
+    point_supports: Annotated[tuple[tuple[Number, Number, Positive], ...], unit("m", "m", "N/m")] = ()
     line_masses: dict[str, Annotated[Positive, unit("kg/m")]] = Field(default_factory=dict)
     damping: DampingTable = empty()
 
@@ -90,6 +130,12 @@ class PlateStructure(StructureTable):
     def mesh_file(self) -> str | None:
         """Absolute path of the file that its mesh is in, None of a rectangle."""
         return self.mesh
+
+    @property
+    def holds(self) -> dict[str, EdgeTable]:
+        """Named edge ↦ how it is held, of all that are not free; "clamped" too, which a mesh need not have."""
+        edges = {"clamped": EdgeTable(kind="clamped"), **self.edges}
+        return {name: edge for name, edge in edges.items() if edge.kind != "free"}
 
     @property
     def is_orthotropic(self) -> bool:
@@ -125,8 +171,9 @@ class PlateStructure(StructureTable):
             with problems_at("thickness", self.thickness):
                 check_start(self.thickness)
             check_profile_length("thickness", self.thickness, self.length)
-        for i, (x, _, _) in enumerate(self.point_masses):
-            check_on_span(f"point_masses.{i}.0", x, self.length)
+        for key in ("point_masses", "point_supports"):
+            for i, (x, _, _) in enumerate(getattr(self, key)):
+                check_on_span(f"{key}.{i}.0", x, self.length)
         if material.name == "orthotropic" and self.E1 is not None and self.E2 is not None and self.nu12 is not None:
             limit = math.sqrt(self.E1 / self.E2)
             if abs(self.nu12) >= limit:

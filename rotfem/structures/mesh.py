@@ -88,7 +88,7 @@ def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
     if data.mesh is None:
         return rectangle(data, problem.mesh, comm, problem.loads.stations)
     wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
-    return from_file(Path(data.mesh), wanted, comm)
+    return from_file(Path(data.mesh), wanted, tuple(data.holds), () if data.edges else CLAMP, comm)
 
 
 def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] = ()) -> PlateGrid:
@@ -109,15 +109,25 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] 
     return PlateGrid(out, boundary_tags(out, 1, edges), {name: i for i, name in enumerate(EDGES, start=1)})
 
 
-def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
-    """Return the mesh of a gmsh file: physical curves, "clamped" among them, and the surface "plate" or regions."""
+def from_file(
+    path: Path, regions: Sequence[str], held: Sequence[str], needed: Sequence[str], comm: MPI.Comm
+) -> PlateGrid:
+    """Return the mesh of a gmsh file with the physical surface "plate", or regions.
+
+    Args:
+        path: of the file.
+        regions: names of physical surfaces, instead of "plate".
+        held: names of physical curves that hold the plate, as far as there are any.
+        needed: names of physical curves that there must be.
+        comm: communicator the mesh is distributed over.
+    """
     import gmsh
 
     groups: dict[int, dict[str, int]] = {}
     why: str | None = None
     if comm.rank == 0:
         try:
-            groups = read(gmsh, path, tuple(regions) or ("plate",))
+            groups = read(gmsh, path, tuple(regions) or ("plate",), held, needed)
         except BadMesh as error:
             why = str(error)
         except Exception as error:  # the others wait for rank 0: whatever happens there must reach them
@@ -138,6 +148,9 @@ def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
 #: gmsh's number of a kind of cells ↦ corners of a cell: triangles of 3 and 6 nodes, quadrilaterals of 4 and 9.
 KINDS = {2: 3, 9: 3, 3: 4, 10: 4}
 
+#: The curve that holds a plate unless something else is said.
+CLAMP = ("clamped",)
+
 #: Names of physical groups ↦ tag, by dimension.
 Groups = dict[int, dict[str, int]]
 
@@ -146,7 +159,9 @@ class BadMesh(Exception):
     """Why a mesh is not one of a plate."""
 
 
-def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
+def read(
+    gmsh: Any, path: Path, surfaces: Sequence[str], held: Sequence[str] = CLAMP, needed: Sequence[str] = CLAMP
+) -> Groups:
     """Return the physical curves and surfaces of a file, whose model gmsh then holds, its nodes numbered from 1."""
     if path.suffix != ".msh":
         raise BadMesh("must be a mesh file of gmsh, with the ending .msh")
@@ -157,7 +172,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
     for dimension, tag in gmsh.model.getPhysicalGroups():
         groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
-    _check_names(groups, surfaces)
+    _check_names(groups, surfaces, needed)
     gmsh.model.mesh.renumberNodes()
     numbers, x, _ = gmsh.model.mesh.getNodes()
     x = x.reshape(-1, 3)[np.argsort(numbers)]
@@ -168,7 +183,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     nodes = np.concatenate([part for _, part in found])
     _check_flat(x[nodes.ravel()])
     curves = {name: _elements(gmsh, 1, name, tag)[1][:, :2] for name, tag in groups[1].items()}
-    check_cells(x[:, :2], nodes[:, : KINDS[kind]], curves)
+    check_cells(x[:, :2], nodes[:, : KINDS[kind]], curves, [curves[name] for name in held if name in curves])
     return groups
 
 
@@ -185,13 +200,14 @@ def _load(gmsh: Any, path: Path) -> None:
             raise BadMesh(f"gmsh cannot read it: {str(error).replace(str(link), path.name)}") from None
 
 
-def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
-    """Refuse a solid, and other physical groups than a clamp, further curves and the surfaces of the plate."""
-    for dimension, kind, wanted in ((1, "curve", ["clamped"]), (2, "surface", surfaces)):
+def _check_names(groups: Groups, surfaces: Sequence[str], needed: Sequence[str]) -> None:
+    """Refuse a solid, and other physical groups than curves and the surfaces of the plate."""
+    for dimension, kind, wanted in ((1, "curve", needed), (2, "surface", surfaces)):
         for name in wanted:
             if name not in groups[dimension]:
                 named = ", ".join(f'"{other}"' for other in groups[dimension]) or "none"
-                raise BadMesh(f'has no physical {kind} "{name}" (physical {kind}s: {named})')
+                why = ", and structure.edges names none that holds it" * (dimension == 1)
+                raise BadMesh(f'has no physical {kind} "{name}" (physical {kind}s: {named}){why}')
     for name in (*groups[3], *(groups[2].keys() - set(surfaces))):
         raise BadMesh(f'its physical group "{name}" is of dimension 3, or no region of structure.thickness or "plate"')
 
@@ -214,7 +230,7 @@ def _check_flat(x: Array) -> None:
         raise BadMesh(f"it leaves the plane x₃ = 0 (by {away:.3g} m); a plate lies in it")
 
 
-def check_cells(x: Array, cells: Integers, curves: Mapping[str, Integers]) -> None:
+def check_cells(x: Array, cells: Integers, curves: Mapping[str, Integers], held: Sequence[Integers]) -> None:
     """Refuse cells without area, that overlap at an edge, or that nothing holds, and curves along no edges of cells."""
     from scipy.sparse import coo_array  # slow to load, and only mesh files need it
     from scipy.sparse.csgraph import connected_components
@@ -234,17 +250,19 @@ def check_cells(x: Array, cells: Integers, curves: Mapping[str, Integers]) -> No
     for name, wanted in curves.items():
         if len(bad := np.flatnonzero(~np.isin(_keys(wanted), keys))):
             raise BadMesh(f'its physical curve "{name}" has an edge at {_at(x[wanted[bad[0]]])} that is none of a cell')
-    every = np.concatenate(list(curves.values()))
+    every = np.concatenate([np.empty((0, 2), dtype=np.int64), *curves.values()])
     _, first, count = np.unique(_keys(every), return_index=True, return_counts=True)
     if np.any(count > 1):
         raise BadMesh(f"an edge at {_at(x[every[first[count > 1][0]]])} is in two physical curves; can be in one only")
     number, size = len(cells), len(cells) + len(keys)
     pairs = np.repeat(np.arange(number), cells.shape[1]), number + edge.ravel()
     part = connected_components(coo_array((np.ones(len(pairs[0])), pairs), (size, size)), directed=False)[1]
-    clamp = number + np.searchsorted(keys, _keys(curves["clamped"]))
-    loose = np.flatnonzero(~np.isin(part[:number], part[clamp]))
+    holding = number + np.searchsorted(keys, _keys(np.concatenate(held))) if held else [0]  # else with the first one
+    loose = np.flatnonzero(~np.isin(part[:number], part[holding]))
     if len(loose):
-        where = f'are not connected to the curve "clamped", one of them at {_at(corners[loose[0]])}'
+        where = (
+            f"are not connected to {'a curve that is held' if held else 'the others'}, one at {_at(corners[loose[0]])}"
+        )
         raise BadMesh(f"{len(loose)} of its {number} cells {where}; parts that meet must share the nodes there")
 
 

@@ -26,16 +26,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-#: Family of a beam's modes ↦ its word in names.
-WORDS = {"flap": "flapwise", "lag": "edgewise"}
+#: Family of the bending of a beam ↦ its word in names of a blade, and of another beam that an axis across it turns.
+WORDS = {"flap": ("flapwise", "out-of-plane"), "lag": ("edgewise", "in-plane")}
 
 
 class ModeName(NamedTuple):
     """The name of a mode: "1st flapwise", "2nd edgewise–flapwise", "4th edgewise, slow", "1st forward whirl".
 
     Attributes:
-        kind: "flapwise", "edgewise", "axial", "torsion", "bending", …, two of them where the mode is mixed.
-        number: from 1 on.
+        kind: "flapwise", "in-plane", "axial", "torsion", "bending", …, two of them where the mode is mixed.
+        number: from 1 on; 0 of rigid bodies, which have none.
         nodal: nodal lines in the place of kind and number: "2 nodal diameters, 1 circle".
         rest: "slow", "fast", "forward", "backward", or nothing.
         letter: of one of several that are called the same.
@@ -48,13 +48,16 @@ class ModeName(NamedTuple):
     letter: str = ""
 
     def __str__(self) -> str:
-        own = self.nodal or f"{self.number}{ordinal_ending(self.number)} {self.kind}"
+        own = self.nodal or (f"{self.number}{ordinal_ending(self.number)} " if self.number else "") + self.kind
         return ", ".join(part for part in (own, self.letter, self.rest) if part)
 
-    def mixed_with(self, family: str) -> ModeName:
-        """Return the name of a mode that belongs to another family, too."""
-        other = f"–{WORDS.get(family, family)}"
-        return self._replace(kind=self.kind + other, nodal=self.nodal and self.nodal + other)
+    def mixed_with(self, word: str) -> ModeName:
+        """Return the name of a mode that belongs to another family too, by the word of that."""
+        return self._replace(kind=f"{self.kind}–{word}", nodal=self.nodal and f"{self.nodal}–{word}")
+
+
+#: The name of a motion that nothing holds.
+RIGID_BODY = ModeName("rigid body", 0)
 
 
 def nodal_lines(diameters: int, circles: int) -> str:
@@ -132,13 +135,17 @@ STATIONS, ACROSS = 24, 4
 
 
 def plate_mode_name(
-    family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any], disk: Disk | None = None
+    family: str,
+    coordinates: dict[str, npt.NDArray[Any]],
+    y: npt.NDArray[Any],
+    disk: Disk | None = None,
+    cantilever: bool = True,
 ) -> ModeName:
     """Return the name of a plate mode.
 
     A plate clamped along an edge has "nth bending" (n − 1 nodal lines across it, none along), "nth torsion" (one line
     along), "chordwise (m,n)" (m ≥ 2 lines along) and "nth in-plane"; a disk "m nodal diameters, s circles", beside its
-    clamp.
+    clamp; one that is held otherwise "bending (m,n)", n − 1 lines along x and m − 1 across.
     """
     real = in_phase(y)
     if disk is not None:
@@ -147,6 +154,8 @@ def plate_mode_name(
     along, across = _lines(coordinates["x"], coordinates["y"], real)
     if family != "bending":
         return ModeName(family, across + 1)
+    if not cantilever:
+        return ModeName(family, across + 1, f"bending ({across + 1},{along + 1})")
     if along > 1:
         return ModeName("chordwise", across + 1, f"chordwise ({along},{across + 1})")
     return ModeName(("bending", "torsion")[along], across + 1)
@@ -282,14 +291,14 @@ def with_whirl(names: list[ModeName], waves: Sequence[Wave], omega: npt.NDArray[
     """Return the names of a rotor's modes with the direction they run in, and those of whirl by their place.
 
     The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
-    those of its direction, by the frequency in the fixed frame: "2nd backward whirl". Shafts that do not whirl bend,
-    neither flapwise nor edgewise.
+    those of its direction, by the frequency in the fixed frame: "2nd backward whirl". Those of shafts that do not
+    whirl are of "bending".
     """
     ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
     out = [name._replace(rest=way or name.rest) for name, way in zip(names, ways, strict=True)]
     for j, wave in enumerate(waves):
         if wave.shaft:
-            words = ("bending" if word in WORDS.values() else word for word in out[j].kind.split("–"))
+            words = ("bending" if word in sum(WORDS.values(), ()) else word for word in out[j].kind.split("–"))
             out[j] = out[j]._replace(kind="–".join(dict.fromkeys(words)))
     for way in ("forward", "backward"):
         same = [j for j, wave in enumerate(waves) if wave.shaft and ways[j] == way]

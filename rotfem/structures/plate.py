@@ -1,4 +1,4 @@
-"""The Mindlin plate q = (u_1, u_2, u_3, alpha_1, alpha_2) in the plane (a_1, a_2), clamped along an edge.
+"""The Mindlin plate q = (u_1, u_2, u_3, alpha_1, alpha_2) in the plane (a_1, a_2), held along edges.
 
 Membrane force, shear force and moment are those of plane stress, N = h Q ε, V = k h G γ, M = (h³/12) Q κ. Membrane and
 shear energy are integrated with 2k − 1, bending and inertia fully: the elements then do not lock in the thin limit.
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
+import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -19,6 +20,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import Delaunay, KDTree
 
+from rotfem.along import ONE
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.bodies import Body, Kinematics, Strain
 from rotfem.mechanics.loads import AppliedLoad, Load
@@ -26,6 +28,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
+from rotfem.numerics.projection import with_ghosts
 from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
@@ -36,15 +39,16 @@ from rotfem.structures.structure import Array, PointValues, Structure, check_mem
 
 def plate_points(plate: Structure) -> Points:
     """Return the points of masses and loads of a plate."""
-    masses = [row[:2] for row in plate.data.point_masses]
-    applied = list(plate.problem.loads.places)
-    points = Points(plate.mesh, [*masses, *applied])
+    data, applied = plate.data, list(plate.problem.loads.places)
+    rows = {key: [row[:2] for row in getattr(data, key)] for key in ("point_masses", "point_supports")}
+    points = Points(plate.mesh, [*rows["point_masses"], *rows["point_supports"], *applied])
     missing = points.missing
     if missing is None:
         return points
     why = f"({missing[0]:g}, {missing[1]:g}) is not on the plate"
-    if missing in masses:
-        raise InputError("structure.point_masses", list(plate.data.point_masses[masses.index(missing)]), why)
+    for key, places in rows.items():
+        if missing in places:
+            raise InputError(f"structure.{key}", list(getattr(data, key)[places.index(missing)]), why)
     raise InputError(f"loads.at.{applied.index(missing)}.x", list(missing), why)
 
 
@@ -110,6 +114,10 @@ def shear_moduli(p: Mapping[str, Any]) -> Any:
     return p["shear_correction"] * ufl.as_matrix([[p["G13"], 0], [0, p["G23"]]])
 
 
+#: Stiffness per length of what holds an edge that runs along no axis, times that of the plate over its thickness: the
+#: layer along an edge that its shear bends is as wide as the plate is thick, so that this part of it is not held.
+ASKEW = 1e4
+
 #: Part of the energy that reduced integration does not see and is put back; all of it would stiffen the plate.
 SEEN = 0.1
 
@@ -161,13 +169,12 @@ class Plate(Structure):
         self.dx = ufl.dx(self.mesh, subdomain_data=subdomains, metadata={"quadrature_degree": 2 * k})
         reduced = (2 * k - 1 if cell == "quadrilateral" else 2 * k - 2) if settings.integration == "reduced" else 2 * k
         self.dx_elastic = ufl.dx(self.mesh, subdomain_data=subdomains, metadata={"quadrature_degree": reduced})
-        self.clamped = fem.locate_dofs_topological(self.V, 1, self.grid.edges("clamped"))
+        self._hold()
         low, high = self._box()
         self.length = float(np.max(high - low))
         thick = np.max([*s.thickness.values()] if isinstance(s.thickness, dict) else s.thickness_at(0.0))
         self.radius = float(thick) / math.sqrt(12.0)
         self._has_tip = "tip" in self.grid.curve_names
-        self.root = self.grid.along("clamped")
         self.tip = self.grid.along("tip") if self._has_tip else None
         self.tip_values = PointValues(self.V, self._tip_point(low, high))
         self._properties()
@@ -177,6 +184,77 @@ class Plate(Structure):
     def is_symmetric(cls, data: Any, normal: int) -> bool:
         """Return whether these data are symmetric about the middle surface, as those of any plate are."""
         return True
+
+    # --- edges ------------------------------------------------------------------------------------------------------
+
+    def _hold(self) -> None:
+        """Find the edges that are held, which way they run, and their nodes."""
+        grid, known = self.grid, self.grid.curve_names
+        for name in self.data.edges:
+            if name not in known:
+                raise InputError(
+                    "structure.edges", name, f"is no named edge of the plate; there are {', '.join(known)}"
+                )
+        self.edges = {name: edge for name, edge in self.data.holds.items() if name in known}
+        self.edge_nodes = {n: fem.locate_dofs_topological(self.V, 1, grid.edges(n)) for n in self.edges}
+        nodes = [n for name, n in self.edge_nodes.items() if self._zero(name)]
+        self.clamped = np.unique(np.concatenate([np.empty(0, dtype=np.int32), *nodes]))
+
+    def _along(self, name: str) -> int | None:
+        """Return the axis, 0 or 1, that an edge runs along; None where along neither."""
+        a, b = np.moveaxis(self.grid.ends(name)[..., :2], 1, 0)
+        aside = np.max(np.abs(b - a) / np.linalg.norm(b - a, axis=1, keepdims=True), axis=0)
+        return next((axis for axis in (0, 1) if aside[1 - axis] < ONE), None)
+
+    def _zero(self, name: str) -> set[str]:
+        """Return the components that are zero on an edge; on one along no axis springs do it (see `_springs`)."""
+        edge, along = self.edges[name], self._along(name)
+        zero = {"u1", "u2"} if edge.held_in_plane else set()
+        if edge.kind == "symmetric":
+            return set() if along is None else {f"u{2 - along}", f"alpha{2 - along}"}
+        if edge.kind == "clamped":
+            return {*zero, "u3", "alpha1", "alpha2"}
+        if edge.kind == "elastic":
+            return zero
+        return {*zero, "u3"} | (
+            {f"alpha{1 + along}"} if edge.kind == "simply_supported" and along is not None else set()
+        )
+
+    def holds(self) -> list[tuple[npt.NDArray[np.int32], list[int]]]:
+        """Return the nodes of edges, and which of their unknowns are zero."""
+        names, zero = [self.components[i] for i in self.active], {name: self._zero(name) for name in self.edges}
+        of = {name: [i for i, component in enumerate(names) if component in zero[name]] for name in self.edges}
+        return [(self.edge_nodes[name], places) for name, places in of.items() if places]
+
+    def clamp_middle(self) -> Array:
+        """Return the middle of all edges that are held, by their length, (3,) in m; the origin where none is."""
+        ends = np.concatenate([np.zeros((0, 2, 3)), *map(self.grid.ends, self.edges)])
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return np.asarray(lengths @ ends.mean(axis=1) / lengths.sum()) if len(ends) else np.zeros(3)
+
+    def _springs(self) -> list[Strain]:
+        """Return the springs of elastic edges and points, and those that hold edges along no axis (see `ASKEW`).
+
+        These have as few points as the shear has: a tilt that is zero all along curved cells makes them too stiff.
+        """
+        h, Q, k = self.section["thickness"], plane_stress(self.section)[0, 0], self.V.element.basix_element.degree
+        n, u, t, out = ufl.FacetNormal(self.mesh), self.k.q, self.director(self.k.q), list[Strain]()
+        normal, along = ufl.as_vector((n[0], n[1], 0)), ufl.as_vector((-n[1], n[0], 0))
+        for name, edge in self.edges.items():
+            askew, springs = self._along(name) is None, list[tuple[Any, Any]]()
+            if edge.kind == "elastic":
+                stiffness = [self.scalar(f"edge_{name}_{n}", getattr(edge, n)) for n in ("stiffness", "rotation")]
+                springs = list(zip((u[2], ufl.dot(t, normal)), stiffness, strict=True))
+            elif edge.kind == "symmetric" and askew:
+                springs = [(u[0] * n[0] + u[1] * n[1], ASKEW * Q), (ufl.dot(t, normal), ASKEW * Q * h**2 / 12)]
+            elif edge.kind == "simply_supported" and askew:
+                springs = [(ufl.dot(t, along), ASKEW * Q * h**2 / 12)]
+            ds = self.grid.along(name)(metadata={"quadrature_degree": 2 * k - 3 if askew else 2 * k})
+            out += [Strain(f"edge {name}", value, stiffness, ds) for value, stiffness in springs]
+        for i, (x, y, stiffness) in enumerate(self.data.point_supports, start=1):
+            value, at = self.scalar(f"point_support_{i}", stiffness), self.points.measure((x, y))
+            out.append(Strain(f"point support {i}", u[2], value, at))
+        return out
 
     # --- mesh -------------------------------------------------------------------------------------------------------
 
@@ -189,12 +267,14 @@ class Plate(Structure):
 
     def _tip_point(self, low: Array, high: Array) -> Array:
         """Return the middle of the edge "tip"; without one, the point of the plate farthest from the clamp."""
-        if self.data.length is not None:
+        if self.data.length is not None and not self.data.edges:
             return np.array([self.data.length, 0.0, 0.0])
         x = self.V.tabulate_dof_coordinates()
         if self._has_tip:
             return self._middle(*np.moveaxis(self.grid.ends("tip")[..., :2], 1, 0))
-        distance = KDTree(np.concatenate(self.comm.allgather(x[self.clamped]))).query(x)[0]
+        held = np.concatenate(self.comm.allgather(x[self.clamped]))
+        held = held if len(held) else np.array([[*(low + high) / 2, 0.0]])  # nothing is: farthest from the middle
+        distance = KDTree(held).query(x)[0]
         best = int(np.argmax(distance)) if len(x) else 0
         candidates = self.comm.allgather((float(distance[best]), *map(float, x[best])) if len(x) else (-1.0, 0, 0, 0))
         return np.array(max(candidates)[1:])
@@ -263,6 +343,7 @@ class Plate(Structure):
             Strain("membrane", _voigt(membrane), h * Q, self.dx_elastic),
             Strain("shear", shear, h * kG, self.dx_elastic),
             Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
+            *self._springs(),
         ]
         if self.problem.mesh.integration == "full":
             return strains
@@ -397,11 +478,29 @@ class Plate(Structure):
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
-        return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk)
+        cantilever = list(self.edges) == ["clamped"] and self.edges["clamped"].kind == "clamped"
+        return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk, cantilever)
 
     def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
         """Return how modes travel around a disk; empty of other plates."""
         return [] if self.disk is None else [self.disk.wave(w, axis[2]) for w in values[..., 2]]
+
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have, of its squares."""
+        element, owned = self.V.element.basix_element, self.mesh.topology.index_map(2).size_local
+        points, weights = basix.make_quadrature(element.cell_type, 2 * element.degree)
+        less = basix.create_element(
+            basix.ElementFamily.P, element.cell_type, element.degree - 1, element.lagrange_variant
+        )
+        whole, part = (np.sqrt(weights)[:, None] * e.tabulate(0, points)[0, :, :, 0] for e in (element, less))
+        basis = np.linalg.qr(part)[0]
+        nodes = with_ghosts(self.V, x[: len(x) - len(x) % self.size]).reshape(-1, self.size)[:, self.moves]
+        shapes = nodes[self.V.dofmap.list[:owned]]
+        both = [
+            np.sum(np.abs(np.einsum("pn,cni->cpi", A, shapes)) ** 2) for A in (whole - basis @ (basis.T @ whole), whole)
+        ]
+        left, all_of_it = self.comm.allreduce(np.array(both))
+        return float(left / all_of_it)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""

@@ -201,7 +201,7 @@ class Structure:
         dx, dx_elastic: measures of full integration, and of that which keeps locking away.
         tip: measure of the end of the structure that tip forces work on.
         root: measure of the clamped end.
-        clamped: local numbers of the clamped nodes.
+        clamped: local numbers of the nodes that are held in any direction.
         tip_values: reads the values at the tip.
         points: where loads or masses are at a point.
         load_constants: name of a load ↦ its amplitude in the forms.
@@ -344,6 +344,10 @@ class Structure:
         """Return the forces of the structure on its supports; none here."""
         return {}
 
+    def clamp_middle(self) -> Array:
+        """Return the place that moments at the root are about, on the mesh, (3,) in m."""
+        return np.zeros(3)
+
     @property
     def released(self) -> set[int]:
         """Numbers of the components that the clamp leaves free: turns in hinges."""
@@ -354,14 +358,18 @@ class Structure:
         free = self.released
         return [place for place, i in enumerate(self.active) if i not in free]
 
-    def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.intp]:
-        """Return the local numbers of the unknowns that the clamp holds at nodes, of all owned nodes if None."""
-        held = self._numbers(nodes, self._clamped_components())
-        if nodes is not None or not self.extra:
-            return held
-        owned = self.V.dofmap.index_map.size_local
-        elsewhere = [n[n < owned] * self.size + len(self.active) + i for i, n in enumerate(self.without_extra())]
-        return np.concatenate([held, *elsewhere])
+    def holds(self) -> list[tuple[npt.NDArray[np.int32], list[int]]]:
+        """Return local nodes, and which of their unknowns are zero."""
+        return [(self.clamped, self._clamped_components())]
+
+    def clamped_unknowns(self, ghosts: bool = False) -> npt.NDArray[np.intp]:
+        """Return the local numbers of the unknowns held, at owned nodes or at all, there without further unknowns."""
+        found = [self._numbers(nodes, places, ghosts) for nodes, places in self.holds()]
+        if self.extra and not ghosts:
+            owned = self.V.dofmap.index_map.size_local
+            other = enumerate(self.without_extra(), start=len(self.active))
+            found += [(n[n < owned] * self.size + i).astype(np.intp) for i, n in other]
+        return found[0] if len(found) == 1 else np.unique(np.concatenate([np.empty(0, dtype=np.intp), *found]))
 
     def without_extra(self) -> list[npt.NDArray[np.int32]]:
         """Return of each further unknown the local nodes that do not have it; of none here."""
@@ -370,24 +378,25 @@ class Structure:
     def hinged_unknowns(self) -> npt.NDArray[np.intp]:
         """Return the local numbers of those of owned nodes that the clamp leaves free, and of further unknowns."""
         constrained = self._clamped_components()
-        free = self._numbers(None, [i for i in range(self.size) if i not in constrained])
+        free = self._numbers(self.clamped, [i for i in range(self.size) if i not in constrained])
         nodes = np.arange(self.V.dofmap.index_map.size_local if self.extra else 0, dtype=np.int32)
         return np.union1d(free, self._numbers(nodes, list(range(len(self.active), self.size)))).astype(np.intp)
 
-    def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.intp]:
-        if nodes is None:
-            nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
-        return np.asarray((nodes[:, None] * self.size + np.array(components, dtype=np.intp)).ravel())
+    def _numbers(self, nodes: npt.NDArray[np.int32], places: list[int], ghosts: bool = False) -> npt.NDArray[np.intp]:
+        if not ghosts:
+            nodes = nodes[nodes < self.V.dofmap.index_map.size_local]
+        return np.asarray((nodes[:, None] * self.size + np.array(places, dtype=np.intp)).ravel())
 
     def clamp_conditions(self) -> list[Any]:
         """Return the boundary conditions of the clamp."""
-        constrained = self._clamped_components()
-        if len(constrained) == self.size:
-            return [fem.dirichletbc(fem.Function(self.V), self.clamped)]
-        held = [(i, self.clamped) for i in constrained]
+        whole = [nodes for nodes, places in self.holds() if len(places) == self.size]
+        held = [(i, nodes) for nodes, places in self.holds() if len(places) < self.size for i in places]
         held += [(len(self.active) + i, nodes) for i, nodes in enumerate(self.without_extra())]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, nodes * self.size + i, self.V.sub(i)) for i, nodes in held]
+        return [
+            *(fem.dirichletbc(fem.Function(self.V), nodes) for nodes in whole),
+            *(fem.dirichletbc(zero, nodes * self.size + i, self.V.sub(i)) for i, nodes in held),
+        ]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
@@ -524,6 +533,14 @@ class Structure:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
 
+    def word(self, family: str) -> str:
+        """Return what a family is called in names of modes."""
+        return family
+
+    def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
+        """Return whether a shape at the nodes (n, components) is a motion of a rigid body, as far as known."""
+        return False
+
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
@@ -538,6 +555,10 @@ class Structure:
     def oriented(self, values: Array) -> Array:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
         return values
+
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have; of beams none."""
+        return 0.0
 
     def total(self, q: Array) -> Array:
         """Return q (local dof array) with rotations that are counted from the undeformed structure."""

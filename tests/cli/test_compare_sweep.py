@@ -125,7 +125,7 @@ def test_sweep_writes_a_table_arrays_and_a_figure(folder: Path, rotfem: Rotfem) 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--set", "motion.speed=1,2", "--", "explain"), "needs -- and a verb after it: run, modes"),
+        (("--set", "motion.speed=1,2", "--", "explain"), "needs a verb, on the command line after --: run, modes"),
         (("--set", "motion.speed=1,2", "--", "modes", "--nonsense"), "No such option"),
         (("--set", "motion.speed=1", "--", "modes"), "must give a key several values"),
         (("--set", "motion.speed=1:b:3", "--", "modes"), "must give a key several values"),

@@ -178,10 +178,10 @@ def test_the_history_is_the_same_with_and_without_an_error() -> None:
 def test_errors_of_steps_and_mesh_one_by_one() -> None:
     """Of a smooth motion the steps are what counts; on one element without steps to speak of it is the mesh."""
     fast = scene(0.05, motion=SPIN_UP, time={"end": 6.0}, mesh={"elements": 4, "degree": 4})
-    error = rotfem.run(fast, parts=True).summary["error"]
+    error = rotfem.run(fast, error="parts").summary["error"]
     assert error["time"] > 100 * error["space"]
     slow = scene(0.002, loads={"tip_force": [[0.0, 0.0, 0.0], [4.0, 0.0, 50.0]]}, mesh={"elements": 2, "degree": 2})
-    error = rotfem.run(slow | {"time": {"end": 1.0, "step": 0.002}}, parts=True).summary["error"]
+    error = rotfem.run(slow | {"time": {"end": 1.0, "step": 0.002}}, error="parts").summary["error"]
     assert error["space"] > error["time"]
 
 

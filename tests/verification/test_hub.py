@@ -48,8 +48,21 @@ def test_coupled_frequency_in_the_thin_limit(ratio: float, exact: float) -> None
     rows = rotfem.modes(scene).rows
     assert rows[0]["label"] == "rigid body"
     assert rows[0]["frequency"] == 0.0
-    assert rows[1]["label"] == "1st edgewise"
+    assert rows[1]["label"] == "1st in-plane"
     assert rows[1]["frequency_hz"] == pytest.approx(exact, rel=1e-6)
+
+
+def test_figures_of_a_free_hub() -> None:
+    """The table has angle, speed and torque, whose jumps are no overshoot, and the vibration that is left after it."""
+    result = rotfem.run(hub_scene({"time": {"end": 0.3, "step": 1e-3}, "output.error": False}))
+    figures, t, u2 = result.figures, result.t, result.tip["u2"]
+    after = t >= figures["torque_end"]
+    assert figures["tip_u2_residual"] == pytest.approx(np.ptp(u2[after]) / 2)
+    assert not np.any(result.history["torque"][after])
+    assert figures["torque_min"] == np.min(result.history["torque"])
+    assert figures["psi_final"] == result.history["psi"][-1]
+    (table,) = result.tables()
+    assert {"angle ψ (rad)", "speed Ω (rad/s)", "torque on the hub (N·m)"} <= {row[0] for row in table.rows}
 
 
 def test_heavy_hub_is_a_clamp() -> None:

@@ -9,9 +9,8 @@ import pytest
 from scipy.io import mmread
 
 import rotfem
-from rotfem import SceneError, modes
+from rotfem import SceneError, modes, response
 from rotfem.analysis.state_space import write_matrices
-from rotfem.commands.response import response
 from tests.beams import STRUCTURE
 
 pytestmark = pytest.mark.estimated
