@@ -503,9 +503,9 @@ class Plate(Structure):
         cantilever = list(self.edges) == ["clamped"] and self.edges["clamped"].kind == "clamped"
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk, cantilever)
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode travels around a disk; None of other plates."""
-        return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return how modes travel around a disk; empty of other plates."""
+        return [] if self.disk is None else [self.disk.wave(w, axis[2]) for w in values[..., 2]]
 
     def unresolved(self, x: npt.NDArray[Any]) -> float:
         """Return the part of a shape (owned unknowns) that cells of one degree less would not have, of its squares."""
