@@ -98,17 +98,25 @@ def draw_campbell(ax: Axes) -> None:
     """Draw the whirls of the shaft over its speed."""
     diagram = rotfem.campbell(SHAFT, "0:12000:21rpm")
     rpm, hertz = 60 / (2 * np.pi), 1 / (2 * np.pi)
-    colors = {"forward": "C3", "backward": "C0"}
+    styles = {"forward whirl": ("C0", "-"), "backward whirl": ("C1", "--"), "torsion": ("C2", "-")}
     for k, label in enumerate(diagram.labels):
-        color = next((c for kind, c in colors.items() if kind in label), "0.5")
-        ax.plot(diagram.speeds * rpm, diagram.frequencies[:, k] * hertz, color=color, label=label)
-    ax.plot(diagram.speeds * rpm, diagram.speeds * hertz, color="0.3", lw=0.8, ls="--", label="1X")
-    for at in diagram.critical_speeds:
-        if at.order == 1 and at.branch:
-            ax.plot(at.speed * rpm, at.frequency * hertz, "o", color="k", mfc="w", ms=5)
-    ax.set(xlabel="speed (rpm)", ylabel="frequency (Hz), fixed frame", title="Campbell diagram, two disks")
+        number, kind = label.split(" ", 1)
+        color, dashes = styles[kind]
+        ax.plot(
+            diagram.speeds * rpm,
+            diagram.frequencies[:, k] * hertz,
+            color=color,
+            ls=dashes,
+            label=kind if number == "1st" else None,
+        )
+    ax.plot(diagram.speeds * rpm, diagram.speeds * hertz, color="0.3", lw=0.8, ls=":", label="speed of the shaft")
+    found = [(c.speed * rpm, c.frequency * hertz) for c in diagram.critical_speeds if c.kind != "per_rev" and c.branch]
+    ax.plot(*zip(*found, strict=True), "ko", ms=5, label="critical speed")
+    ax.set(
+        xlabel="speed (rpm)", ylabel="frequency (Hz), fixed frame", title="Campbell diagram of a shaft with two disks"
+    )
     ax.grid(True, lw=0.4, alpha=0.6)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=9, loc="upper left")
 
 
 def draw_cost(ax: Axes) -> None:
@@ -123,7 +131,7 @@ def draw_cost(ax: Axes) -> None:
     ax.set_xticks([0.1, 0.2, 0.5], ["0.1", "0.2", "0.5"])
     ax.set(xlabel="CPU time of a run (s)", ylabel="error of the tip's motion (–)", title="What accuracy costs")
     ax.grid(True, lw=0.4, alpha=0.6)
-    ax.legend(loc="center right", fontsize=8)
+    ax.legend(loc="lower left", fontsize=9)
 
 
 def draw_effects(ax: Axes) -> None:
@@ -131,7 +139,8 @@ def draw_effects(ax: Axes) -> None:
     found = rotfem.explain(SCENE).effects
     names = [name.replace("_", " ") for name in found]
     ax.barh(names, [row["worst"] for row in found.values()], color="C3")
-    ax.axvline(1e-2, color="0.3", lw=0.8, ls="--")
+    ax.axvline(1e-2, color="0.3", lw=0.8, ls="--", label="1 %")
+    ax.legend(fontsize=9)
     ax.invert_yaxis()
     ax.set(xscale="log", xlabel="change of the answer without it (–)", title="What each effect changes")
     ax.grid(True, axis="x", lw=0.4, alpha=0.6)
@@ -144,7 +153,11 @@ def draw_hard(ax: Axes) -> None:
     for n in (1, 2, 3):
         ax.axhline(np.sqrt(n * (2 * n - 1)), color="0.3", lw=0.8, ls="--", label="string" if n == 1 else None)
         ax.loglog(slenderness, found[:, n - 1], "o-", label=f"flap {n}")
-    ax.set(xlabel="length / radius of gyration (–)", ylabel="frequency / speed (–)", title="A blade as thin as a hair")
+    ax.set(
+        xlabel="length / radius of gyration (–)",
+        ylabel="frequency / speed (–)",
+        title="A hard case: a blade as thin as a hair",
+    )
     ax.grid(True, lw=0.4, alpha=0.6)
     ax.legend()
 

@@ -13,6 +13,8 @@ STRAINS = {
     "planar_beam": ("gamma1", "gamma2", "kappa"),
     "spatial_beam": ("gamma1", "gamma2", "gamma3", "kappa1", "kappa2", "kappa3"),
 }
+#: Turn of a section about the bent axis, rad.
+TWIST: dict[str, tuple[str, ...]] = {"planar_beam": (), "spatial_beam": ("twist",)}
 #: The same of a plate: membrane forces and shear forces (N/m), moments (N), largest equivalent stress (Pa).
 RESULTANTS = {"plate": ("n11", "n22", "n12", "q1", "q2", "m11", "m22", "m12", "von_mises")}
 

@@ -1,6 +1,6 @@
 """rotfem and other programs on the same cases, in turn, with their errors: a table, peers.csv and peers.png.
 
-    ./with-fenicsx python3 benchmarks/peers/run.py [-o FOLDER] [--repetitions 5] [--case NAME …]
+    ./with-fenicsx python3 benchmarks/peers/run.py [-o FOLDER] [--repetitions 5] [--case NAME …] [--search]
 
 The other programs are installed from PyPI into an environment of their own, `peers` in the cache folder. Every
 repetition of a case runs each program once, in a process of its own, one thread; in it the case runs twice, and the
@@ -8,8 +8,8 @@ second time is measured, in CPU time: of histories the time loop, of frequencies
 history the largest of the tip's u₂ over the instants of the table by the largest |u₂|, of frequencies the largest one
 at the first and the last speed. References share no code with any of the programs (`tests/reference`); for the blade it
 is pyBModes with 800 elements (`docs/blades.md`), for the rotors ROSS with 48. What each program is given (mesh, steps,
-tolerance) is in `CASES`: by trial, the cheapest that meets the error in the case's name, of frequencies about one error
-for both.
+tolerance) is in `CASES`: of histories what `--search` finds, the cheapest setting of one grid of elements and steps for
+both that meets the error in the case's name; of frequencies a mesh each of about one error.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import sys
 import venv
 from dataclasses import dataclass, field
 from datetime import date
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -59,7 +60,7 @@ CASES: dict[str, dict[str, tuple[str, dict[str, Any]] | str]] = {
     },
     "spin-up to 1e-4": {
         "rotfem": ("spin_up", {"elements": 1, "steps": 120, "scheme": "esdirk4", "degree": 4}),
-        "exudyn": ("spin_up", {"elements": 8, "steps": 8000, "tolerance": 1e-7}),
+        "exudyn": ("spin_up", {"elements": 10, "steps": 6000, "tolerance": 1e-7}),
     },
     "spin-up to 1e-6": {
         "rotfem": ("spin_up", {"elements": 1, "steps": 400, "scheme": "esdirk4", "degree": 6}),
@@ -94,6 +95,40 @@ CASES: dict[str, dict[str, tuple[str, dict[str, Any]] | str]] = {
         "ross": ("unbalance", {"elements": 12, "bearing": COUPLED, "speeds": WHIRL}),
     },
 }
+
+
+#: Histories whose settings are searched ↦ the error wanted; the elements and steps tried, of both programs.
+SEARCHED = {"spin-up to 1e-3": 1e-3, "spin-up to 1e-4": 1e-4}
+ELEMENTS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
+STEPS = (40, 60, 80, 100, 120, 160, 240, 400, 600, 1000, 1500, 2000, 3000, 4000, 6000, 8000, 12000)
+
+#: Program ↦ its other settings tried. Increments of Newton's method are solved to 1e-3 of the error wanted.
+OTHERS: dict[str, list[dict[str, Any]]] = {
+    "rotfem": [{"scheme": "esdirk4", "degree": degree} for degree in (3, 4, 5)],
+    "exudyn": [{}],
+}
+
+
+def searched(case: str, program: str) -> tuple[dict[str, Any], float, float] | None:
+    """Return the cheapest setting of the grid that meets the error of a case, its CPU time (s) and its error.
+
+    On every mesh steps are refined until the error is met or the cheapest setting so far is exceeded.
+    """
+    wanted, best = SEARCHED[case], None
+    for other, elements in product(OTHERS[program], ELEMENTS):
+        tolerance = {"tolerance": 1e-3 * wanted} if program == "exudyn" else {}
+        for steps in STEPS:
+            setting = {"elements": elements, "steps": steps, **other, **tolerance}
+            try:
+                done = once(program, "spin_up", setting)
+            except (RuntimeError, subprocess.TimeoutExpired):
+                continue  # Newton's method fails in steps that are too long
+            if best is not None and done["seconds"] >= best[1]:
+                break
+            if (reached := error(case, done["values"])) <= wanted:
+                best = setting, done["seconds"], reached
+                break
+    return best
 
 
 @dataclass
@@ -228,8 +263,13 @@ def main() -> None:
     parser.add_argument("-o", "--folder", type=Path, default=Path("results/peers"))
     parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--case", nargs="+", default=list(CASES), choices=list(CASES), metavar="NAME")
+    parser.add_argument("--search", action="store_true", help="find the settings of the histories, and do no more")
     given = parser.parse_args()
     missing, results = install(), {}
+    if given.search:
+        for case, program in product(filter(SEARCHED.__contains__, given.case), OTHERS):
+            print(case, program, missing.get(program) or searched(case, program), flush=True)
+        return
     print(f"{date.today()}, {platform.processor() or platform.machine()}, {os.cpu_count()} cores, one thread\n")
     print("| case | program | least CPU s | median CPU s | error | rotfem / it |\n|---|---|---|---|---|---|")
     rows: list[dict[str, Any]] = []

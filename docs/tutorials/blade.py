@@ -34,7 +34,7 @@ scene = rotfem.Scene.from_dict(
 )
 
 # %% [markdown]
-# ## Is it the blade that was meant?
+# ## Check the input
 #
 # `check` computes nothing but masses and centres, and draws what is there. Slips of units show here.
 

@@ -5,17 +5,18 @@ Let e be the error of an answer, q e that of the coarser one, and d their distan
     e = d / (q − 1),    q = rᵖ
 
 with r the ratio of their steps or cells and p the order (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993,
-section II.4). That the order holds is shown by a third answer, coarser in the same ratio. With d' its distance to the
-second one, q is d'/d, but at most what theory says. Where q is small, e is at most the larger one of both distances.
-Where d is smaller than the highest order of a smooth answer makes it, d'/rᵖ, it is so by chance, and that takes its
-place.
+section II.4).
 
 - Of steps p is 2: higher orders are reduced by stiff components (Hairer & Wanner 1996, section IV.15). Vibrations that
-  are out of phase in one of the answers have no order, so without a third answer d is not divided.
-- Of elements of degree k of a beam p is 2k − 1: displacements at nodes and eigenvalues have 2k (Strang & Fix 1973,
-  sections 1.6 and 6.3), one less where tables have kinks. Where a distance is above `ASYMPTOTIC`, or there is no third
-  answer, it is max(2, k), and without both d is not divided.
-- Of plates p is `CORNER`. Above `ASYMPTOTIC`, where the corners of the clamp are not what counts, it is max(2, k).
+  are out of phase in one of the answers have no order. They may be small beside the motion, but hardly so in its
+  acceleration: where d or the same of second differences is above `ASYMPTOTIC`, d is not divided.
+- Of elements of degree k of a beam, which end where its sections jump, p is 2k − 1: displacements at nodes and
+  eigenvalues have 2k (Strang & Fix 1973, sections 1.6 and 6.3), one less where tables have kinks.
+- Of plates p is `CORNER`.
+- Above `ASYMPTOTIC`, and of plates, a third answer, coarser in the same ratio, shows whether the order holds. With d'
+  its distance to the second one q is d'/d, but at most rᵖ, above `ASYMPTOTIC` that of p = max(2, k), where the corners
+  of the clamp are not what counts. Where q is small, e is at most the larger one of both distances. Where d is smaller
+  than the highest order of a smooth answer makes it, it is so by chance, and that takes its place.
 - Where cells cannot be halved, the other answer has elements of one degree more, on plates and mesh files of one less,
   unless those lock.
 
@@ -39,7 +40,7 @@ from rotfem.results.columns import ShortTable
 from rotfem.results.distance import Distance, Spectrum
 from rotfem.scene import Scene
 
-#: Relative distance of two answers from which their order is seen only in a third one.
+#: Relative distance of two answers up to which their order holds without a third one.
 ASYMPTOTIC = 0.1
 
 #: Distance to an answer of one degree more as a part of the error, where that is a quarter of it, as on half the cells.
@@ -57,10 +58,6 @@ CORNER = 1.5
 
 #: Loosest tolerance of adaptive steps.
 LOOSEST = 0.5
-
-#: Elements of a second answer of a beam below which the third one has fewer than four, longer than half a wave of some
-#: modes, and a small q shows nothing.
-FEW = 7
 
 #: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
 FEWER = 0.75
@@ -97,8 +94,8 @@ class Coarser:
 
     Attributes:
         setting: it.
-        far: the ratio of their errors where distances are above `ASYMPTOTIC`, or there are only two answers.
-        near: where three answers are nearer.
+        far: the ratio of their errors where distances are above `ASYMPTOTIC`.
+        near: where they are nearer.
         most: the highest that smooth answers have.
     """
 
@@ -158,23 +155,21 @@ def coarser(own: Setting, end: float) -> list[Coarser]:
     ]
 
 
-def by_order(apart: float, before: float | None, other: Coarser) -> float:
+def by_order(apart: float, before: float | None, other: Coarser, holds: bool) -> float:
     """Return the error of an answer.
 
     Args:
         apart: its distance to the coarser one.
         before: distance of this one to the next coarser; None without one.
         other: the coarser setting.
+        holds: whether that is known to be in the asymptotic range.
     """
-    if before is None:
-        unseen = other.setting.moving or apart > ASYMPTOTIC
-        return apart / (min(2.0 if unseen else math.inf, other.far, other.near) - 1.0)
-    least, largest, cells = max(apart, before / other.most), max(apart, before), other.setting.elements
+    if holds or before is None:
+        return apart / ((other.near if holds else min(2.0, other.near)) - 1.0)
+    least, largest = max(apart, before / other.most), max(apart, before)
     if least == 0.0:
         return 0.0
     q = min(other.far if largest > ASYMPTOTIC else other.near, before / least)
-    if isinstance(cells, int) and cells < FEW and apart <= ASYMPTOTIC and not other.setting.moving:
-        q = max(q, other.far)
     return min(least / (q - 1.0), largest) if q > 1.0 else largest
 
 
@@ -282,19 +277,23 @@ def _compare(
         return answer
     halved = answer.setting.degree == own.setting.degree
     before: Distance | None = None
-    if halved and (other.near > 2.0 or apart.size > ASYMPTOTIC):
+    plate, moving = isinstance(own.setting.elements, tuple), own.setting.moving
+    if halved and not moving and (plate or apart.size > ASYMPTOTIC):
         coarsest = [c for c in others(answer.setting)[:1] if c.setting.degree == own.setting.degree]
         third, _ = _next(answers, answer, coarsest)
-        if third is not None and not _as_many_steps(name, answer, third[0]):
+        if third is not None:
             output = answer.output  # of modes with those that are no partner by their order
             output = replace(output, count=None) if isinstance(output, Spectrum) else output
             before = output.apart(third[0].output)
+    known = moving or not plate or before is None
     if isinstance(own.output, Spectrum):
         last = [None] * len(apart.each) if before is None else before.each[apart.partners]
-        out.each = each = [by_order(float(d), b, other) for d, b in zip(apart.each, last, strict=True)]
+        pairs = [(float(d), b) for d, b in zip(apart.each, last, strict=True)]
+        out.each = each = [by_order(d, b, other, known and d <= ASYMPTOTIC) for d, b in pairs]
         error = max(each, default=0.0)
     else:
-        error = by_order(apart.size, None if before is None else before.size, other)
+        holds = known and max(apart.size, apart.bent) <= ASYMPTOTIC
+        error = by_order(apart.size, None if before is None else before.size, other, holds)
     if kinks:
         error += own.setting.tolerance or 0.0  # which bounds the error of the steps by what the controller sums
     out.parts[name], out.at = error, apart.at if out.at is None else out.at

@@ -310,7 +310,7 @@ def walk(answers: Answers, accuracy: float, clock: Clock, found: Walk | None = N
             errors.parts["round_off"] = lost if before is None else min(lost, there.size)  # see `errors.estimate`
         found.keep(answer, errors, accuracy)
         following = max(at.values()) + 1
-        curved = error is not None and (model.parts.get("geometry") or 0.0) > accuracy  # no degree lessens that
+        curved = error is not None and (model.parts.get("geometry") or 0.0) > accuracy  # no degree reduces that
         if found.met or curved or (model.parts.get("model") or 0.0) > accuracy:
             break
         before, refine = (at, answer), [name for name in at if EVEN * parts[name] >= max(parts.values())]

@@ -7,6 +7,7 @@ eigenvalue that is zero to round-off it is relative to the smallest other one.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ class Modes:
     steps: int = 0
     stable: bool | None = None
 
-    @property
+    @cached_property
     def output(self) -> Spectrum:
         """Eigenvalues and shapes."""
         return Spectrum(self.spinning.pairs.resolved, sampled(self.analysis, self.spinning.right), self.count)

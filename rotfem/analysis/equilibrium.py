@@ -51,9 +51,10 @@ def steady_state(
 ) -> Array:
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
-    Speed and loads are raised together (on hinges the loads at the full speed), in one step where Newton allows and in
-    smaller ones where not; the state is left in the system's functions. With a `start`, the equilibrium at a nearby
-    speed, the whole load is applied at once. `notes` receives remarks on the way.
+    Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the loads at the
+    full speed on hinges, and where tension by spin is all the stiffness there is, as of a tether. The state is left in
+    the functions of the system. With a `start`, the equilibrium at a speed nearby, the whole load is applied at once;
+    `notes` receives remarks on the way.
     """
     notes = [] if notes is None else notes
     loose = ", ".join(hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0)
@@ -93,7 +94,15 @@ def _compliance_lost(system: System, omega: float) -> bool:
 
 def _grown(system: System, omega: float, newton: Newton, notes: list[str]) -> Array:
     """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory."""
-    found = raised(system, omega, newton)
+    try:
+        found = raised(system, omega, newton)
+    except Unbegun as error:
+        if not omega:
+            raise
+        try:
+            found = raised(system, omega, newton, spun=True)
+        except ComputationError:
+            raise error from None
     if found.least < REGULAR_SHARE:
         if _compliance_lost(system, omega):
             raise ComputationError(f"no steady state at {speed_text(omega)}: steps of the load were cut for ever")
@@ -210,13 +219,17 @@ class Raised:
     least: float = 1.0
 
 
-def set_load(system: System, omega: float, share: float) -> None:
-    """Write a share of the load into a system: of the square of a speed (rad/s), and of loads and gravity."""
-    system.set_time(0.0, system.motion.at_speed(float(np.sqrt(share)) * omega), share)
+class Unbegun(ComputationError):
+    """No share of the load has an equilibrium that is found from the undeformed structure."""
 
 
-def raised(system: System, omega: float, newton: Newton) -> Raised:
-    """Return the equilibrium at full load, in one step or by halved ones.
+def set_load(system: System, omega: float, share: float, spun: bool = False) -> None:
+    """Write a share of the load into a system: of loads, gravity and, unless it is spun up, of the squared speed."""
+    system.set_time(0.0, system.motion.at_speed((1.0 if spun else float(np.sqrt(share))) * omega), share)
+
+
+def raised(system: System, omega: float, newton: Newton, spun: bool = False) -> Raised:
+    """Return the equilibrium at full load, in one step or by halved ones; spun, from that at full speed without loads.
 
     Where there are several equilibria, a step may end at any of them. So a step is halved, too, where an increment of
     Newton's method was beyond its tangent, where the step turns back on the one before, or where the stiffness gets a
@@ -225,14 +238,17 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
     """
     system.count_rotations_from(None)
     q, done, share, least = system.zeros(), 0.0, 1.0, 1.0
+    if spun:
+        straight = Newton(newton.tolerance, newton.max_iterations)  # how it converges says nothing of bending
+        q = balance(system, omega, 0.0, q, straight, spun=True)
     reference, critical, before = system.reference, None, None
     while done < 1.0:
         target, afresh = min(1.0, done + share), False
         try:
-            new = balance(system, omega, target, q, newton)
+            new = balance(system, omega, target, q, newton, spun=spun)
             wandered = newton.wandered
             negative = negative_count(system.tangent(1.0, 0.0, 0.0)[0], sure=True) or 0
-            new = counted(system, omega, new, newton, target)
+            new = counted(system, omega, new, newton, target, spun)
         except BeyondReach as error:
             turns = system.structure.turns
             failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
@@ -270,7 +286,7 @@ def _ended(system: System, omega: float, q: Array, done: float, failure: str, re
         why = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
     where = f" ({speed_text(float(np.sqrt(done)) * omega, 4)})" * bool(omega)
     what = f"no steady state at {speed_text(omega)}: the last equilibrium was at {done:.6g} of the load{where}; {why}"
-    return ComputationError(what, advice=less(system))
+    return (ComputationError if done else Unbegun)(what, advice=less(system))
 
 
 #: Powers of ten by which springs that hold hinges weaken before they let go, and the smallest step of the power.
@@ -313,18 +329,27 @@ def let_go(system: System, omega: float, newton: Newton) -> Array:
         hold(0.0)
 
 
-def counted(system: System, omega: float, q: Array, newton: Newton, share: float = 1.0) -> Array:
+def counted(system: System, omega: float, q: Array, newton: Newton, share: float = 1.0, spun: bool = False) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again."""
     system.check_reach(q)
     turns = system.structure.turns
     if turns is None or not turns.is_due(q):
         return q
-    return balance(system, omega, share, recounted(system, q), newton)
+    return balance(system, omega, share, recounted(system, q), newton, spun=spun)
 
 
-def balance(system: System, omega: float, share: float, guess: Array, newton: Newton, *, checked: bool = True) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads."""
-    set_load(system, omega, share)
+def balance(
+    system: System,
+    omega: float,
+    share: float,
+    guess: Array,
+    newton: Newton,
+    *,
+    checked: bool = True,
+    spun: bool = False,
+) -> Array:
+    """Solve F(q, 0, 0) = 0 by Newton's method at a share of the load (see `set_load`)."""
+    set_load(system, omega, share, spun)
     q = guess.copy()
 
     def correction(before: Array | None) -> Array:

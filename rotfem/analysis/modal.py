@@ -28,7 +28,7 @@ from rotfem.analysis.mixed_modes import MixedModes
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modal_damping import by_family, massed
 from rotfem.equations.system import System
-from rotfem.errors import InputError
+from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics import forms
@@ -320,6 +320,10 @@ class ModalAnalysis:
         t1 = perf_counter()
         pencil, clamped = self.pencils(speed, q, keep)
         t2 = perf_counter()
+        if massed(clamped.M) == 0:
+            raise ComputationError(
+                "the structure has no mass, and so no modes", advice="rho, mass_per_length or masses"
+            )
         pencil.sizes = self.stiffness_sizes(pencil.K)
         if not self.free:
             pencil.factor = self.system.analysed

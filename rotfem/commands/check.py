@@ -35,7 +35,7 @@ def weighed(scene: Scene, comm: MPI.Comm) -> CheckResult:
         structure = scene.structure
         root = np.array(getattr(structure, "root_position", (structure.hub_radius, 0.0, 0.0)))
         axis = np.array(scene.motion.axis) / np.linalg.norm(scene.motion.axis)
-        center = np.array(body.first_moment / body.mass)
+        center = np.array(body.first_moment / (body.mass or 1.0))
         columns = columns_of(model.structure)
         found: dict[str, Any] = {
             **summary("check", scene, comm, model.structure.mesh.comm),
@@ -76,7 +76,7 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
         if f"EI{axis}" not in columns:
             continue
         stiff = np.sqrt(columns[f"EI{axis}"] / columns["EA"])
-        heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / columns["mass_per_length"])
+        heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / np.maximum(columns["mass_per_length"], 1e-300))
         apart = np.exp(np.abs(np.log(np.where(heavy > 0.0, heavy / stiff, 1.0))))
         what = f"radii of gyration about axis {axis} of stiffness and mass differ {{:.3g}} times"
         found.append((x, apart, 10.0, what))

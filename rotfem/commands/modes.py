@@ -30,7 +30,7 @@ from rotfem.listeners import Compiling, Hint, cpu_time, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.results.modes import ModesResult
+from rotfem.results.modes import WORST_FIT, ModesResult
 from rotfem.results.result import Result
 from rotfem.results.result_set import Writer
 from rotfem.scene import Scene
@@ -54,6 +54,11 @@ def analysed(
     def compute(variant: Scene, errors: Errors | None = None, known: Modes | None = None) -> ModesResult:
         found = _modes(variant, Problem.of(variant, terms=terms), comm, hint, errors, known)
         found.blade_tables = blade_tables
+        if blade_tables:
+            fitted = {row["mode"] for row in found.mode_polynomials()}
+            if names := ", ".join(row["label"] for row in found.rows if row["mode"] not in fitted):
+                why = f"none of degree 6 is within {100 * WORST_FIT:g} % of its flap, lag or twist"
+                found.summary["warnings"].append(f"no mode polynomial of {names}: {why}")
         if sensitivities:
             from rotfem.analysis.sensitivity import sensitivities as derivatives
 

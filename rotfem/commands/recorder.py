@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.along import TWIST
 from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.equilibrium import conditioning, rounding_message
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
@@ -197,7 +198,7 @@ class StationRows:
     def __init__(self, system: System, output: OutputTable):
         self.output, beam = output, system.structure
         self._stations = Stations(system, output.positions(beam.length))
-        self.names = (*output.sections(beam.type), *beam.components)
+        self.names = (*output.sections(beam.type), *beam.components, *TWIST[beam.type])
         self._columns = [self._stations.names.index(name) for name in self.names]
         self.kept: list[tuple[float, Array]] = []
         self.seen = 0

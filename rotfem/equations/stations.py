@@ -29,7 +29,7 @@ import ufl
 from dolfinx import fem, la
 from ufl.algorithms import expand_derivatives
 
-from rotfem.along import FORCES, RESULTANTS, STRAINS
+from rotfem.along import FORCES, RESULTANTS, STRAINS, TWIST
 from rotfem.equations.system import System
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed
@@ -38,6 +38,7 @@ from rotfem.structures.structure import PointValues
 
 if TYPE_CHECKING:
     from rotfem.structures.plate import Plate
+    from rotfem.structures.spatial_beam import SpatialBeam
 
 Array = npt.NDArray[np.float64]
 
@@ -105,14 +106,14 @@ class Stations:
     """Section forces, strains and unknowns of a beam at its stations (m, increasing); the hub is fixed.
 
     Attributes:
-        names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad).
+        names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad), in space elastic twist (rad).
     """
 
     def __init__(self, system: System, positions: tuple[float, ...]):
         self.system, self.positions = system, np.array(positions)
         self.beam = cast(Beam, system.structure)
         self.comm, self.degree = system.comm, system.V.element.basix_element.degree
-        self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components)
+        self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components, *TWIST[self.beam.type])
         self._points = forms.quadrature_points(self.beam.mesh, self.degree)
         self._damped = DampedStress(system)
         self._place()
@@ -166,6 +167,10 @@ class Stations:
     def _order(self) -> slice:
         return slice(0, len(FORCES[self.beam.type]) + len(STRAINS[self.beam.type]))
 
+    @property
+    def _unknowns(self) -> slice:
+        return slice(self._order.stop, self._order.stop + len(self.beam.components))
+
     def _expression(self) -> Any:
         """Return forces and strains as one UFL vector."""
         return ufl.as_vector([part[i] for part in self._quantities() for i in range(part.ufl_shape[0])])
@@ -194,14 +199,16 @@ class Stations:
         out: Array = np.zeros((len(self.positions), len(self.names)))
         out[:, self._order] = np.tensordot(self._stress, values, 2)
         out = summed(self.comm, out)
-        out[:, self._order.stop :] = [self.beam.whole_values(value(q)) for value in self._at]
+        out[:, self._unknowns] = [self.beam.whole_values(value(q)) for value in self._at]
         return out
 
     def __call__(self) -> Array:
         """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""
         out = self._read(self.beam.total(self.system.q.x.array), self.system.v.x.array)
-        unknowns = out[:, self._order.stop :]
-        out[:, self._order.stop :] = self.system.seen_from_hub(unknowns, self.positions, self.system.time)
+        unknowns = out[:, self._unknowns]
+        for name in TWIST[self.beam.type]:
+            out[:, self.names.index(name)] = cast("SpatialBeam", self.beam).twist(unknowns, self.positions)
+        out[:, self._unknowns] = self.system.seen_from_hub(unknowns, self.positions, self.system.time)
         return out
 
 

@@ -227,7 +227,7 @@ for _effect in (
     Effect(
         "hub_coupling",
         present=lambda problem: problem.motion.hub is not None and problem.motion.hub.coupled,
-        reasons=("the hub is free and coupled", "the hub does not feel the structure"),
+        reasons=("the hub is free and coupled", "the structure does not act on the hub"),
     ),
 ):
     register(_effect)

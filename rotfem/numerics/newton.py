@@ -101,7 +101,7 @@ class Newton:
                 return k
             if k == 1:
                 first = d
-            if k == 2 and first > 0 and factor is None:
+            if k == 2 and 0 < first <= REACH and factor is None:
                 self._kappa = max(0.5 * self._kappa if math.isfinite(self._kappa) else 0.0, d / first**2)
                 self._longest = max(first, 0.5 * self._longest)
             if factor is not None:

@@ -59,7 +59,7 @@ class CampbellResult(Rows):
         summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
             `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `error_bound`, `mesh_error`,
-            `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
+            `share_…`, `confidence` (MAC with the previous speed), `refined` (1 where the speed was not
             asked for); of a shaft or a disk `turning` (1 for a wave that runs with the spin in the rotor, −1 against
             it, 0 for a standing one), `whirl` ("forward", "backward" or "standing") and `frequency_fixed` (rad/s, in
             the fixed frame). A shaft has `log_decrement` δ = −2π Re λ/|Im λ|, None of what does not vibrate; in the
@@ -153,11 +153,11 @@ class CampbellResult(Rows):
         head = ("branch", "name", f"{self.frame} frame: {first}", last, "MAC (–)")
         critical = []
         for c in self.critical_speeds:
-            what = f"{c.label} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.label}, synchronous"
-            critical.append((number(float(units.speeds(c.speed)), digits=8), what))
+            excitation = f"{c.per_rev}Ω" if c.kind == "per_rev" else "synchronous"
+            critical.append((number(float(units.speeds(c.speed)), digits=8), c.label, excitation))
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
         if critical:
-            out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
+            out.append(ShortTable((f"critical speed ({units.speed})", "mode", "excitation"), critical))
         if over := self.summary.get("map"):
             labels = list(dict.fromkeys(row["label"] for row in over["rows"]))[:4]
             found = {(row["value"], row["label"]): f"{units.speeds(row['speed']):.6g}" for row in over["rows"]}

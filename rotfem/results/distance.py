@@ -23,12 +23,14 @@ class Distance:
     Attributes:
         size: largest difference, relative to the largest value (of eigenvalues, to each); infinite if that is 0.
         at: time of the largest difference, s; None of what has no time.
+        bent: the same as size of the second differences of rows, in which fast vibrations are not small; 0 without.
         each: of every eigenvalue, relative to its own size.
         partners: number of the eigenvalue of the other output that each is compared with.
     """
 
     size: float
     at: float | None = None
+    bent: float = 0.0
     each: Array = field(default_factory=lambda: np.empty(0))
     partners: Array = field(default_factory=lambda: np.empty(0, dtype=int))
 
@@ -82,10 +84,13 @@ class Series:
 
     def apart(self, other: Series) -> Distance:
         """Return how far another one is from this one."""
-        change = self.difference(other)
+        here, there = self.beside(other)
+        change = here.difference(there)
         off = np.linalg.norm(change.values, axis=-1)
         largest = float(off.max(initial=0.0)) if np.all(np.isfinite(off)) else np.inf
-        return Distance(relative(largest, self.scale), float(change.times[np.argmax(off)]) if len(off) else None)
+        bent, of = (Series(s.times, np.diff(s.values, 2, axis=0)).scale for s in (change, here))
+        at = float(change.times[np.argmax(off)]) if len(off) else None
+        return Distance(relative(largest, self.scale), at, relative(bent, of))
 
 
 @dataclass(frozen=True)

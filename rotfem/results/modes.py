@@ -6,6 +6,7 @@ Buhl, FAST User's Guide, NREL/EL-500-38230, 2005, "blade input file").
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,8 +32,11 @@ from rotfem.results.files import json_text
 from rotfem.results.result import Array, OfTable, Rows
 from rotfem.results.surfaces import Surface
 
-#: Powers of ξ in a mode polynomial.
-POWERS = range(2, 7)
+#: Powers of ξ in a polynomial of bending, which has no slope at the root, and in one of twist.
+POWERS, TWIST_POWERS = range(2, 7), range(1, 7)
+
+#: Largest error of a polynomial, in parts of the tip's value, with which it is still the mode.
+WORST_FIT = 0.1
 
 #: Direction ↦ (displacement, rotation that is its slope and the sign of it) of a spatial and of a planar beam.
 DIRECTIONS: dict[str, tuple[tuple[str, str, float], ...]] = {
@@ -44,10 +48,10 @@ DIRECTIONS: dict[str, tuple[tuple[str, str, float], ...]] = {
 ELASTODYN = {("flap", 1): "BldFl1Sh", ("flap", 2): "BldFl2Sh", ("lag", 1): "BldEdgSh"}
 
 
-def fit(span: Array, shape: Array) -> tuple[Array, Array]:
-    """Return c₂ … c₆ of the polynomial that is 1 at ξ = 1 and closest to a shape, and what it is off, (n,)."""
-    powers = span[:, None] ** np.array(POWERS)
-    # With c₂ = 1 − c₃ − … − c₆ the sum is 1 whatever the others are.
+def fit(span: Array, shape: Array, exponents: Sequence[int] = POWERS) -> tuple[Array, Array]:
+    """Return c_k of the polynomial that is 1 at ξ = 1 and closest to a shape, and what it is off, (n,)."""
+    powers = span[:, None] ** np.array(exponents)
+    # With the first as 1 less the others the sum is 1 whatever the others are.
     others, *_ = np.linalg.lstsq(powers[:, 1:] - powers[:, :1], shape - powers[:, 0], rcond=None)
     coefficients = np.append(1.0 - others.sum(), others)
     return coefficients, powers @ coefficients - shape
@@ -55,23 +59,24 @@ def fit(span: Array, shape: Array) -> tuple[Array, Array]:
 
 def elastodyn_lines(rows: Sequence[dict[str, Any]]) -> str:
     """Return the mode shape lines of an ElastoDyn blade file, of those of the modes it takes that are there."""
-    lines = []
-    for row in sorted(rows, key=lambda row: list(DIRECTIONS).index(row["direction"])):
-        name = ELASTODYN.get((row["direction"], row["number"]))
-        if name is None:
-            continue
-        of = f"{'Flap' if row['direction'] == 'flap' else 'Edge'} mode {row['number']}"
-        lines += [f"{row[f'c{k}']:18.10f}   {name}({k}) - {of}, coeff of x^{k}" for k in POWERS]
+    found, lines = {(row["direction"], row["number"]): row for row in rows}, list[str]()
+    for key, name in ELASTODYN.items():
+        if row := found.get(key):
+            of = f"{'Flap' if key[0] == 'flap' else 'Edge'} mode {key[1]}"
+            lines += [f"{row[f'c{k}']:18.10f}   {name}({k}) - {of}, coeff of x^{k}" for k in POWERS]
     return "\n".join(lines) + "\n"
 
 
 def _real(columns: dict[str, Array]) -> dict[str, Array]:
-    """Return the columns of a mode at the phase at which its largest displacement is real, and 1 there."""
+    """Return the columns of a mode at the phase at which its largest displacement is real, and 1 there.
+
+    Of one that is scaled by its rotations (see `ModesResult.shapes`) it is the largest rotation.
+    """
     names = [name for name in columns if name != "x" and not name.endswith("_imag")]
     values = {name: columns[name] + 1j * columns[f"{name}_imag"] for name in names}
     moves = np.concatenate([values[name] for name in names if name.startswith("u")])
-    largest = moves[np.argmax(np.abs(moves))]
-    unit = largest if largest != 0.0 else 1.0
+    moves = moves if np.max(np.abs(moves)) > 0.5 else np.concatenate(list(values.values()))
+    unit = moves[np.argmax(np.abs(moves))]
     return {"x": columns["x"]} | {name: np.real(value / unit) for name, value in values.items()}
 
 
@@ -198,31 +203,34 @@ class ModesResult(Rows):
         ]
 
     def mode_polynomials(self) -> list[dict[str, Any]]:
-        """Return one row a bending mode: the polynomial of its leading displacement, and how well it fits.
+        """Return one row a mode of bending or torsion: the polynomial of its leading motion, and how well it fits.
 
-        Columns are `mode`, `label`, `direction` ("flap" or "lag"), `number` among those of the direction,
-        `frequency_hz`, `c2` … `c6`, and `fit_error` and `fit_rms`, the largest and the root mean square of what the
-        polynomial is off at the nodes, in parts of the displacement of the tip. Modes that leave the tip where it is
-        have none.
+        Columns are `mode`, `label`, `direction` ("flap", "lag" or "twist"), `number` among those of the direction,
+        `frequency_hz`, `c1` (0 of bending) … `c6`, and `fit_error` and `fit_rms`, the largest and the root mean square
+        of what the polynomial is off at the nodes, in parts of the tip's value. Modes that no polynomial comes nearer
+        than WORST_FIT have none, as those with a node at the tip, nor has stretch.
 
         Raises:
             InputError: the structure is no beam.
         """
-        out: list[dict[str, Any]] = []
+        out, counts = list[dict[str, Any]](), Counter[str]()
         for mode, columns in self._over_span():
             shapes = {name: columns[f"{name}_displacement"] for name in DIRECTIONS if f"{name}_displacement" in columns}
-            sizes = {name: float(np.max(np.abs(shape))) for name, shape in shapes.items()}
-            direction = max(sizes, key=lambda name: sizes[name])
-            shape = shapes[direction]
-            is_twist = "torsion" in mode["label"]
-            if is_twist or sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
-                continue  # torsion and stretch, and shapes with a node at the tip
-            coefficients, off = fit(columns["span"], shape / shape[-1])
-            number = 1 + sum(other["direction"] == direction for other in out)
-            terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
+            direction = max(shapes, key=lambda name: float(np.max(np.abs(shapes[name]))))
+            twists = "torsion" in mode["label"].partition("–")[0]
+            if not twists and np.max(np.abs(shapes[direction])) < 0.5:
+                continue  # stretch
+            direction, shape = ("twist", columns["twist"]) if twists else (direction, shapes[direction])
+            counts[direction] += 1
+            if not abs(shape[-1]) > 1e-3 * np.max(np.abs(shape)):
+                continue
+            powers = TWIST_POWERS if twists else POWERS
+            coefficients, off = fit(columns["span"], shape / shape[-1], powers)
             errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
-            first = {"mode": mode["mode"], "label": mode["label"], "direction": direction, "number": number}
-            out.append(first | mode | terms | errors)
+            if errors["fit_error"] <= WORST_FIT:
+                first = {"mode": mode["mode"], "label": mode["label"], "direction": direction}
+                terms = {"c1": 0.0} | {f"c{k}": float(c) for k, c in zip(powers, coefficients, strict=True)}
+                out.append(first | {"number": counts[direction]} | mode | terms | errors)
         return out
 
     def drawn(self) -> dict[str, str]:

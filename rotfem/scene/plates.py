@@ -141,7 +141,7 @@ class PlateStructure(StructureTable):
     G12: Modulus | None = None
     G13: Modulus | None = None
     G23: Modulus | None = None
-    rho: Annotated[OverPlace[Positive], along("kg/m**3")]
+    rho: Annotated[OverPlace[NonNegative], along("kg/m**3")]
     shear_correction: ShearCorrection = 5.0 / 6.0
     hub_radius: Annotated[NonNegative, unit("m")] = 0.0
     hub_offset: Annotated[Vector, unit("m")] | None = None

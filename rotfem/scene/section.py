@@ -107,7 +107,7 @@ class Section(SceneModel):
 
     E: Annotated[Profile[Positive], along("Pa")] | None = None
     nu: PoissonProfile | None = None
-    rho: Annotated[Profile[Positive], along("kg/m**3")] | None = None
+    rho: Annotated[Profile[NonNegative], along("kg/m**3")] | None = None
     area: Annotated[Profile[Positive], along("m**2")] | None = None
     shape: str | None = None
     shear_correction: Profile[ShearCorrection] | None = None
@@ -256,7 +256,7 @@ class PlanarSection(Section):
     EA: Annotated[Profile[Positive], along("N")] | None = None
     GA: Annotated[Profile[Positive], along("N")] | None = None
     EI: Annotated[Profile[Positive], along("N*m**2")] | None = None
-    mass_per_length: Annotated[Profile[Positive], along("kg/m")] | None = None
+    mass_per_length: Annotated[Profile[NonNegative], along("kg/m")] | None = None
     rotary_inertia: Annotated[Profile[NonNegative], along("kg*m")] | None = None
     second_moment: Annotated[Profile[Positive], along("m**4")] | None = None
 
@@ -291,9 +291,9 @@ def _check_mass(value: Any) -> Any:
         rows = np.array(M)
         m, coupling, size = rows[0, 0], rows[:3, 3:], ROUND_OFF * np.max(np.abs(rows))
         rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=ROUND_OFF * abs(m))
-        if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
+        if m < 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
             where = "" if x is None else f"at x = {x:g} it "
-            rigid_mass = "m 1 with m > 0 for velocities, m times a skew matrix off the diagonal"
+            rigid_mass = "m 1 with m ≥ 0 for velocities, m times a skew matrix off the diagonal"
             raise problem("", rows.tolist(), f"{where}must be that of rigid mass: {rigid_mass}")
     return value
 
@@ -348,7 +348,7 @@ class SpatialSection(Section):
     GJ: Annotated[Profile[Positive], along("N*m**2")] | None = None
     EI2: Annotated[Profile[Positive], along("N*m**2")] | None = None
     EI3: Annotated[Profile[Positive], along("N*m**2")] | None = None
-    mass_per_length: Annotated[Profile[Positive], along("kg/m")] | None = None
+    mass_per_length: Annotated[Profile[NonNegative], along("kg/m")] | None = None
     rotary_inertia2: Annotated[Profile[NonNegative], along("kg*m")] | None = None
     rotary_inertia3: Annotated[Profile[NonNegative], along("kg*m")] | None = None
     second_moment2: Annotated[Profile[Positive], along("m**4")] | None = None

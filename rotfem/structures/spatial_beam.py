@@ -279,6 +279,18 @@ class SpatialBeam(Beam):
         along = np.column_stack([x, np.zeros((len(x), 2))]) if line is None else line.at(x)[0]
         return np.asarray(self.data.root_position + along @ self.root_turned.T)
 
+    def twist(self, values: Array, x: Array) -> Array:
+        """Return the turn (rad) of sections at x (m) about the bent axis, of their unknowns (n, 6).
+
+        That is the turn τ about the tangent t before the shortest turn leads t to the bent axis (swing and twist):
+        tan ½τ = tan ½|θ| θ·t/|θ|.
+        """
+        line, theta = self.data.reference_line, values[:, 3:]
+        tangents = np.tile([1.0, 0.0, 0.0], (len(x), 1)) if line is None else line.at(x)[1]
+        half = np.linalg.norm(theta, axis=1) / 2
+        along = np.sum(theta * (tangents @ self.root_turned.T), axis=1) / 2 * np.sinc(half / np.pi)
+        return np.asarray(2 * np.arctan2(along, np.cos(half)))
+
     def oriented(self, values: Array) -> Array:
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
         c, s = np.cos(self.data.precone), np.sin(self.data.precone)

@@ -56,6 +56,24 @@ def test_polynomials_are_the_shapes_of_a_cantilever(cantilever):
     assert rows[0]["fit_error"] < 1e-4 < 1e-2 < rows[2]["fit_error"] < 0.1
 
 
+def test_torsion_has_a_polynomial_of_its_twist():
+    """It is sin((2n − 1)πξ/2), from the first power on; shapes that no polynomial comes near are named, not written."""
+    section = {"EA": 1e9, "GA2": 3e8, "GA3": 3e8, "GJ": 5e6, "EI2": 2e7, "EI3": 1e8, "mass_per_length": 100.0}
+    section |= {"rotary_inertia2": 2.0, "rotary_inertia3": 10.0}
+    structure = {"type": "spatial_beam", "length": 30.0, "section": section}
+    result = modes({"structure": structure, "motion": SCENE["motion"], "modes": {"count": 10}}, blade_tables=True)
+    rows, x = result.mode_polynomials(), np.linspace(0.0, 1.0, 101)
+    twists = [row for row in rows if row["direction"] == "twist"]
+    assert [row["label"] for row in twists] == ["1st torsion", "2nd torsion"]
+    for n, row in enumerate(twists, start=1):
+        found = sum(row[f"c{k}"] * x**k for k in range(1, 7))
+        assert found == pytest.approx(np.sin((n - 0.5) * np.pi * x) * (-1) ** (n + 1), abs=3e-3)
+    assert max(row["fit_error"] for row in rows) <= 0.1
+    table = [row["twist"] for row in result.mode_table() if row["mode"] == twists[0]["mode"]]
+    assert np.max(np.abs(table)) == pytest.approx(1 / 30.0)
+    assert any("no mode polynomial of 4th flapwise, 5th flapwise" in text for text in result.summary["warnings"])
+
+
 def test_table_over_the_span(cantilever):
     """The slope of the table is the derivative of its displacement, to shear (1e-4 here) and differences."""
     first = [row for row in cantilever.mode_table() if row["mode"] == 1]

@@ -174,3 +174,22 @@ def test_damping_by_mode_is_a_stress() -> None:
     for name, root, close in (("M", "root_m3", 2e-4), ("Q", "root_f2", 2e-3)):
         hub = result.history[root]
         assert np.max(np.abs(result.stations[name][1:, 0] + hub[1:])) < close * np.max(np.abs(hub)), name
+
+
+def test_twist_is_about_the_bent_axis():
+    """An end moment m bends a beam with GJ = EI₂ = EI₃ to a helix: its turn at x is θ = κ x about κ = m/GJ.
+
+    Its part about the bent axis is 2 atan(tan(½|κ| x) κ₁/|κ|); of torsion alone it is κ₁ x, of bending 0.
+    """
+    x, round_bar = np.array([0.0, 4.0, 10.0]), {**SPATIAL["section"], "GJ": 1e4, "EI2": 1e4, "EI3": 1e4}
+    for turns in ([0.1, 0.15, 0.0], [0.1, 0.0, 0.0], [0.0, 0.15, 0.0]):
+        scene = {
+            "structure": {**SPATIAL, "section": round_bar},
+            "motion": {"type": "constant", "speed": 0.0},
+            "loads": {"tip_moment": {"value": [1e4 * k for k in turns], "kind": "follower"}},
+            "output": {"stations": x.tolist(), "error": False},
+        }
+        stations, size = rotfem.run(scene).stations, np.linalg.norm(turns)
+        assert stations is not None
+        wanted = 2 * np.arctan(np.tan(size * x / 2) * turns[0] / size)
+        np.testing.assert_allclose(stations["twist"][-1], wanted, atol=1e-5)

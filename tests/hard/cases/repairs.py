@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from tests.hard.case import Case
 
@@ -50,6 +52,33 @@ def released(theory: str, displacement: float, end: float) -> dict[str, Any]:
         mesh={"elements": 4},
         time={"end": end, "step": 0.01},
     )
+
+
+def tether(speed: float, force: float) -> dict[str, Any]:
+    """Return the scene of 100 km of line with 500 kg at its end, which a force (N) pushes out of the plane."""
+    section = dict.fromkeys(("EA", "GA2", "GA3"), 1e6) | dict.fromkeys(("GJ", "EI2", "EI3"), 1e-3)
+    section |= {"mass_per_length": 0.01, "rotary_inertia2": 1e-11, "rotary_inertia3": 1e-11}
+    structure = {"type": "spatial_beam", "length": 1e5, "tip_mass": 500.0, "section": section}
+    loads = {"tip_force": [0.0, 0.0, force]}
+    return {"structure": structure, "motion": {"type": "constant", "speed": speed}, "loads": loads}
+
+
+def string_tip(speed: float, force: float) -> list[float]:
+    """Return (u₁, u₃) of the tip (m) of the `tether` as a string: H' = −ρΩ² r₁, V = F, r' = (1/T + 1/EA)(H, V)."""
+
+    def shape(H: float) -> Any:
+        def rate(x: float, y: Any) -> list[float]:
+            stretch = 1 / np.hypot(y[2], force) + 1e-6
+            return [stretch * y[2], stretch * force, -0.01 * speed**2 * y[0]]
+
+        return solve_ivp(rate, (0.0, 1e5), [0.0, 0.0, H], rtol=1e-9, atol=1e-9).y[:, -1]
+
+    def gap(H: float) -> float:
+        end = shape(H)
+        return float(end[2] - 500.0 * speed**2 * end[0])
+
+    x, z, _ = shape(brentq(gap, 0.5e8 * speed**2, 2e8 * speed**2, rtol=1e-12))
+    return [float(x - 1e5), float(z)]
 
 
 CASES = [
@@ -138,4 +167,45 @@ CASES += [
         tolerance=1e-5,
         source="the ratio that is given",
     )
+]
+CASES += [
+    Case(
+        "tension alone",
+        f"100 km at {speed:g} rad/s, {force:g} N across",
+        tether(speed, force),
+        value=lambda result: [result.summary["figures"][f"tip_u{i}_final"] for i in (1, 3)],
+        reference=string_tip(speed, force),
+        tolerance=1e-5,
+        source="string equations by shooting",
+    )
+    for speed, force in ((0.01, 1.0), (0.001, 1.0), (0.01, 1000.0))
+]
+CASES += [
+    Case(
+        "strong damping",
+        "rayleigh = [1e6, 0]",
+        beam(damping={"rayleigh": [1e6, 0.0]}, modes={"count": 6}),
+        value=lambda result: np.sort(-result.growth[:5][result.growth[:5] > -1.0])[:3] * 1e6 / FIRST**2,
+        reference=[1.0, (22.0345 / 3.516015) ** 2, (61.6972 / 3.516015) ** 2],
+        tolerance=3e-3,
+        source="λ = −ω²/1e6 of slow modes; Blevins 1979, table 8-1",
+        command="modes",
+    ),
+    Case(
+        "no mass",
+        "static tip force",
+        beam(section={"mass_per_length": 0.0}, loads={"tip_force": [0.0, 0.5]}),
+        value=lambda result: result.summary["figures"]["tip_u2_final"],
+        reference=0.5 * LENGTH**3 / (3 * EI),
+        tolerance=1e-3,
+        source="F L³/3EI",
+    ),
+    Case(
+        "no mass",
+        "modes",
+        beam(section={"mass_per_length": 0.0}),
+        command="modes",
+        expected="failed",
+        words="the structure has no mass, and so no modes",
+    ),
 ]
