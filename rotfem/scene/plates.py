@@ -205,7 +205,7 @@ class PlateStructure(StructureTable):
         check_one_hub(self.hub_radius, self.hub_offset)
         for name, value in self.varying.items():
             if isinstance(value, dict) and (geometry.name != "mesh" or set(value) != set(self.regions) or not value):
-                raise problem(name, value, "values by region need a mesh, and one for every region")
+                raise problem(name, value, "by region it needs a mesh, and a value for every one")
             if not isinstance(value, tuple):
                 continue
             if self.length is None:
