@@ -148,7 +148,10 @@ class Spinning:
 
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
-        return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))))
+        out = replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))))
+        if "waves" in self.__dict__:
+            out.waves = self.waves[:count]
+        return out
 
     @cached_property
     def _energies(self) -> Array:
@@ -181,15 +184,11 @@ class Spinning:
 
         The sense of the spin counts, without spin that of its axis.
         """
-        axis = np.asarray(self.analysis.system.motion.axis) * (-1.0 if self.speed < 0.0 else 1.0)
-        found = []
-        for x in self.right.T:
-            coordinates, values = self.analysis.structure.nodes(x)
-            wave = self.analysis.structure.wave(coordinates, values, axis)
-            if wave is None:
-                return []
-            found.append(replace(wave, fixed=self.analysis.fixed))
-        return found
+        axis = self.analysis.system.motion.axis * (-1.0 if self.speed < 0.0 else 1.0)
+        nodes = [self.analysis.structure.nodes(x) for x in self.right.T]
+        shapes = np.array([values for _, values in nodes])
+        found = self.analysis.structure.waves(nodes[0][0], shapes, axis) if nodes else []
+        return [replace(wave, fixed=self.analysis.fixed) for wave in found]
 
     @cached_property
     def names(self) -> list[ModeName]:
@@ -353,7 +352,7 @@ class ModalAnalysis:
         return found
 
     def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool, reference: Any = None) -> Spinning:
-        """Return what `at` has found before, or on another process, of its parts."""
+        """Return what `at` has found before, of its parts."""
         self.system.count_rotations_from(reference)
         pencil, clamped = self.pencils(speed, q)
         return Spinning(self, speed, q, pencil, pairs, clamped, rigid, reference)

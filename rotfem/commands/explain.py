@@ -190,10 +190,18 @@ class Explanation:
         self.given, self.terms, self.comm = scene, terms, comm
         frame = "rotating" if scene.model.frame == "inertial" else scene.model.frame
         self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": frame})
-        self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
+        problem = Problem.of(scene, terms=terms).replace(outputs={})
         self.inner, self.effects = communicator(problem, comm), problem.replace(effects=None).effective_effects()
-        self._systems: dict[tuple[str, str], Any] = {}
-        self.system = self._switched(problem)
+        self._systems, self._unable = dict[tuple[str, str], Any](), dict[str, dict[str, InputError]]()
+        while not hasattr(self, "system"):
+            try:
+                self.system = self._switched(problem)
+            except InputError as error:
+                if isinstance(scene.model.effects, tuple) or error.key != "model.effects":
+                    raise
+                able = tuple(name for name in problem.effective_effects() if name != error.value)
+                problem = problem.replace(effects=able)  # "auto" takes what the theory can have
+        self.problem = problem
         degree = self.system.V.element.basix_element.degree  # a default differs by cell
         self.own = replace(Setting.of(scene), degree=degree, effects=problem.effective_effects())
         self.absent, hub = self._absent(), problem.motion.hub
@@ -230,12 +238,22 @@ class Explanation:
     def _switched(self, problem: Problem) -> Any:
         """Return the system of a problem; those of one theory and mesh are one, with effects switched by constants."""
         whole = problem.replace(effects=None)
-        key = problem.theory.name, repr(problem.mesh)
-        if key not in self._systems:
-            system = self._systems[key] = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
-            if system.linear:
+        key, wanted = (problem.theory.name, repr(problem.mesh)), set(problem.effective_effects())
+        unable = self._unable.setdefault(problem.theory.name, {})
+        while key not in self._systems or wanted & set(unable):
+            for name in wanted & set(unable):
+                raise unable[name]
+            able = tuple(name for name in whole.effective_effects() if name not in unable)
+            system = compile_system(whole.replace(effects=able), self.inner, self.scene.time is not None, parted=True)
+            try:
                 system.check_terms()
-        self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
+            except InputError as error:
+                if error.key != "model.effects":
+                    raise
+                unable[error.value] = error  # of a linear theory, in which the others are seen without it
+            else:
+                self._systems[key] = system
+        self._systems[key].leave_out(set(whole.effective_effects()) - set(unable) - wanted)
         return self._systems[key]
 
     def _of(self, variant: Scene) -> tuple[Problem, Any, Newton]:

@@ -401,7 +401,6 @@ def explain(
         SceneError: the scene is not valid.
     """
     with begun("explain", scene, common) as job:
-        from rotfem.accuracy.tuned import write_variant
         from rotfem.commands.explain import explained
 
         job.check_writable("--write", write, job.scene.inputs)
@@ -410,7 +409,7 @@ def explain(
         if write is not None and job.first:
             within = result.summary["needed"]["accuracy"]
             remark = f"# {given.name} with the theory and the effects that it needs for {within:g}.\n\n"
-            write_variant(job.scene, result.needed, Path(write), remark)
+            job.scene.replace(result.needed).write(write, remark)
             job.say(f"scene with what it needs in {write}")
         return result
 

@@ -83,6 +83,7 @@ COLUMNS = {
     "angle": ("angle of the larger semi-axis from direction 2", "rad"),
     "probe": ("amplitude that a probe reads", "m"),
     **{f"f{i}": (f"force of the shaft on a support, f{_SUB[i]}", "N") for i in "23"},
+    **{f"m{i}": (f"moment of the shaft on a support, m{_SUB[i]}", "N·m") for i in "23"},
     "stiffness": ("stiffness of the supports", "N/m"),
     "tilt_stiffness": ("stiffness of the supports against tilt", "N·m"),
     "frequency": ("frequency", "rad/s"),

@@ -7,6 +7,7 @@ complete and consistent; what does not raises one `SceneError` that names the ke
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -15,7 +16,7 @@ import numpy as np
 from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
 
 from rotfem import registry
-from rotfem.errors import SceneError, show
+from rotfem.errors import OutputError, SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
@@ -73,7 +74,7 @@ else:
 
 
 class Scene(SceneModel):
-    """A validated scene. Immutable; `replace` makes variants.
+    """A validated scene. Immutable; `replace` makes variants. Two are equal where all that they say is.
 
     Attributes:
         structure: what moves: planar beam, spatial beam or plate.
@@ -178,6 +179,46 @@ class Scene(SceneModel):
         variant = type(self)._validate(tables, self._name, self._file, self._directory)
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
         return variant
+
+    def write(self, path: str | Path, remark: str = "") -> Path:
+        """Write what was set in the scene as TOML, after a remark of comment lines; return the path.
+
+        What is read from there is equal. Paths of files that the scene reads are relative to the folder of the new one.
+
+        Raises:
+            SceneError: the scene holds a Python function, which no file can.
+            OutputError: the file cannot be written.
+        """
+        import tomli_w
+
+        path, start = Path(path), Path(self._directory)
+        files = set(map(os.path.realpath, self._inputs))
+
+        def moved(value: Any) -> Any:
+            """Return tables with the paths of files made relative to the folder of the new one."""
+            if isinstance(value, Mapping):
+                return {key: moved(entry) for key, entry in value.items()}
+            if isinstance(value, list):
+                return [moved(entry) for entry in value]
+            if not isinstance(value, str | Path) or "\0" in str(value):
+                return value
+            ours = os.path.realpath(start / value) in files and not Path(value).is_absolute()
+            return os.path.relpath(start.resolve() / value, path.parent.resolve()) if ours else str(value)
+
+        try:
+            text = tomli_w.dumps(moved(self._tables))
+        except TypeError:
+            why = "holds a Python function, so that it cannot be written as TOML"
+            raise SceneError(self._file, allowed=why) from None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(remark + text, encoding="utf-8")
+        except OSError as error:
+            raise OutputError(path, error.strerror or str(error)) from None
+        return path
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.__dict__ == other.__dict__
 
     def showing(self, what: str, given: object) -> Self:
         """Return the scene with "speed" or "frequency" shown in the unit of a text, if it has none itself."""

@@ -545,13 +545,20 @@ class Structure:
         """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor."""
-        return None
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return how modes e^{iωt} precess about an axis, from their complex shapes (modes, nodes, components).
+
+        Empty unless a rotor.
+        """
+        return []
 
     def oriented(self, values: Array) -> Array:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
         return values
+
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have; of beams none."""
+        return 0.0
 
     def total(self, q: Array) -> Array:
         """Return q (local dof array) with rotations that are counted from the undeformed structure."""

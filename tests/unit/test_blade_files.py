@@ -11,7 +11,6 @@ import pytest
 import yaml
 
 import rotfem
-from rotfem.accuracy.tuned import write_variant
 from rotfem.commands.fields import axes_along
 from rotfem.commands.import_blade import write_imported
 from rotfem.scene import Scene, load_scene
@@ -244,7 +243,7 @@ def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
     beam = {"type": "spatial_beam", "length": decks.LENGTH, "section": section}
     tables = {"structure": beam, "motion": {"type": "constant", "speed": 0.0}}
     scene = Scene.from_dict(tables, directory=tmp_path)
-    tuned = load_scene(write_variant(scene, {"mesh.degree": 2}, tmp_path / "deeper" / "tuned.toml", ""))
+    tuned = load_scene(scene.replace({"mesh.degree": 2}).write(tmp_path / "deeper" / "tuned.toml"))
     found = tuned.tables["structure"]
     assert found == {**beam, "section": {**section, "from": "../blade", "EA": "../EA.csv"}}
     assert tuned.structure == scene.structure
