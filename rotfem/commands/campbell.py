@@ -25,7 +25,7 @@ from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import modal_summary, shared_out
+from rotfem.commands.processes import modal_summary
 from rotfem.commands.recorder import check_rows
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress
@@ -141,10 +141,6 @@ def diagram(
     sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
     if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
-    if analysis.everyone.size > analysis.comm.size and sweep.model is None:  # each process has a copy
-        left = [speed for speed in values if speed not in sweep.known]
-        sweep.known |= solved_by_all(analysis, left, count, progress)
-        sweep.solves += len(left)
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))
@@ -280,21 +276,6 @@ class FinishedSpeeds:
         """Remove the file of a diagram that is finished."""
         if MPI.COMM_WORLD.rank == 0:
             self._path.unlink(missing_ok=True)
-
-
-def solved_by_all(
-    analysis: ModalAnalysis, values: Sequence[float], count: int, progress: Progress | None
-) -> dict[float, Spinning]:
-    """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
-    before, ranks = list[Spinning](), analysis.everyone.size
-
-    def solve(speed: float) -> tuple[Any, ...]:
-        before.append(found := analysis.at(speed, count + SPARE, before[-1] if before else None))
-        if progress is not None:
-            progress(min(1.0, len(before) * ranks / len(values)))
-        return speed, found.q, found.pairs, found.rigid, found.reference  # which another process can have
-
-    return {found[0]: analysis.restored(*found) for found in shared_out(values, solve, analysis.everyone)}
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:

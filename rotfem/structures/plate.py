@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
+import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -27,6 +28,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
+from rotfem.numerics.projection import with_ghosts
 from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
@@ -468,20 +470,59 @@ class Plate(Structure):
 
     @property
     def doubt(self) -> str:
-        """What is said of a plate that is nearly round; "" of others."""
-        if not ROUND < self._outline.off <= NEARLY:
+        """What is said of a plate that is nearly round, or of fibres far stiffer than what joins them; "" of others."""
+        if ROUND < self._outline.off <= NEARLY:
+            off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
+            return (
+                f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+            )
+        return self._of_strips() if self.data.is_orthotropic else ""
+
+    def _of_strips(self) -> str:
+        """Return which modes in the plane the mesh has no waves for; "" of most materials.
+
+        Strips along the fibres, x, bend against each other without shear, u_2 = f(x) G,y and u_1 = −f,x G. With
+        ∫ f,xx² = k⁴ ∫ f² their G has E_2 G,yyyy + ρ ω² G,yy + E_1 k⁴ G = 0. At a free edge, where it dies away in waves
+        of 2π (E_2/E_1)^¼/k, ρ ω² is k² √(E_1 E_2). A cantilever's first k is 1.8751/L.
+        """
+        s, across = self.data, int(self.data.E1 >= self.data.E2)
+        low, high = self._box()
+        k, E = 1.8751 / float(high[1 - across] - low[1 - across]), float(np.sqrt(s.E1 * s.E2))
+        wave = 2 * np.pi / k * (min(s.E1, s.E2) / max(s.E1, s.E2)) ** 0.25
+        x = self.mesh.geometry.x[self.mesh.geometry.dofmap, across]
+        widest = self.comm.allreduce(float(np.ptp(x, axis=1).max(initial=0.0)), op=MPI.MAX)
+        if constants(s)["G12"] < E or wave > 2 * widest:
             return ""
-        off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
-        return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+        return (
+            f"coarse: from about {k * np.sqrt(E / s.rho):.3g} rad/s on strips along fibres bend in the plane, in "
+            f"waves of {wave:.2g} m across them, which cells of {widest:.2g} m do not have"
+        )
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""
         cantilever = list(self.edges) == ["clamped"] and self.edges["clamped"].kind == "clamped"
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk, cantilever)
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode travels around a disk; None of other plates."""
-        return None if self.disk is None else self.disk.wave(values[:, 2], axis[2])
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return how modes travel around a disk; empty of other plates."""
+        return [] if self.disk is None else [self.disk.wave(w, axis[2]) for w in values[..., 2]]
+
+    def unresolved(self, x: npt.NDArray[Any]) -> float:
+        """Return the part of a shape (owned unknowns) that cells of one degree less would not have, of its squares."""
+        element, owned = self.V.element.basix_element, self.mesh.topology.index_map(2).size_local
+        points, weights = basix.make_quadrature(element.cell_type, 2 * element.degree)
+        less = basix.create_element(
+            basix.ElementFamily.P, element.cell_type, element.degree - 1, element.lagrange_variant
+        )
+        whole, part = (np.sqrt(weights)[:, None] * e.tabulate(0, points)[0, :, :, 0] for e in (element, less))
+        basis = np.linalg.qr(part)[0]
+        nodes = with_ghosts(self.V, x[: len(x) - len(x) % self.size]).reshape(-1, self.size)[:, self.moves]
+        shapes = nodes[self.V.dofmap.list[:owned]]
+        both = [
+            np.sum(np.abs(np.einsum("pn,cni->cpi", A, shapes)) ** 2) for A in (whole - basis @ (basis.T @ whole), whole)
+        ]
+        left, all_of_it = self.comm.allreduce(np.array(both))
+        return float(left / all_of_it)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference."""
