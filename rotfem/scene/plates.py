@@ -6,12 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
 from rotfem.scene.table import SceneModel, Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
+    Array,
     NonNegative,
     Number,
     PoissonRatio,
@@ -24,6 +26,7 @@ from rotfem.scene.values import (
     check_profile_length,
     check_span,
     check_start,
+    evaluate,
 )
 
 
@@ -187,6 +190,11 @@ class PlateStructure(StructureTable):
         """Thickness and constants of the material that vary over the place, by name."""
         given = {name: getattr(self, name) for name in ("thickness", *MATERIAL)}
         return {name: value for name, value in given.items() if value is not None and not isinstance(value, float)}
+
+    def at(self, name: str, places: npt.ArrayLike) -> Array:
+        """Return a property that is a table, at places along x, or distances from the origin (m), of their shape."""
+        value = getattr(self, name)
+        return evaluate(value.table if isinstance(value, Over) else value, places)
 
     @property
     def regions(self) -> tuple[str, ...]:

@@ -29,7 +29,6 @@ from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.mechanics.theories import richest
 from rotfem.numerics import forms
 from rotfem.numerics.projection import with_ghosts
-from rotfem.scene.values import evaluate
 from rotfem.structures.mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import NEARLY, ROUND, Disk, ModeName, Wave, plate_mode_name
 from rotfem.structures.points import Points
@@ -80,21 +79,21 @@ def properties(data: Any) -> dict[str, Any]:
     return {name: values["G12"] if value is None else value for name, value in values.items()}
 
 
-def over_place(name: str, value: Any, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
+def over_place(data: Any, name: str, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
     """Return a property that varies: by region, along x (see `section_fields`), over r, or as a function says.
 
     What varies over r, or by a function, is that at the nodes of a field of the degree of the unknowns in each cell.
     """
+    value = getattr(data, name)
     if isinstance(value, dict):
         f = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name=name)
         for region, number in value.items():
             f.x.array[grid.regions.find(grid.region_names[region])] = number
         f.x.scatter_forward()
         return f
-    table = getattr(value, "table", value)
-    if isinstance(table, tuple) and getattr(value, "over", "x") == "x":
+    if not callable(value) and getattr(value, "over", "x") == "x":
         f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree if len(rows) else 1)), name=name)
-        space, at = f.function_space, lambda x, near: evaluate(table, x + ONE * (near - x))
+        space, at = f.function_space, lambda x, near: data.at(name, x + ONE * (near - x))
         f.x.array[:] = field_values(at, rows, degree, space, positive).ravel()
         return f
     f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree)), name=name)
@@ -105,7 +104,7 @@ def over_place(name: str, value: Any, grid: PlateGrid, rows: Array, degree: int)
     else:
         middle = np.empty_like(x)
         middle[cells] = x[cells].mean(axis=1)[:, None]
-        f.x.array[:] = evaluate(table, np.linalg.norm(x + ONE * (middle - x), axis=1))
+        f.x.array[:] = data.at(name, np.linalg.norm(x + ONE * (middle - x), axis=1))
     if len(bad := np.flatnonzero(f.x.array <= 0.0)) and not name.startswith("nu"):
         at = x[bad[0]]
         raise InputError(
@@ -318,7 +317,7 @@ class Plate(Structure):
         s, degree = self.data, self.V.element.basix_element.degree
         for name, value in properties(s).items():
             varies = not isinstance(value, float)
-            field = over_place(name, value, self.grid, self.inner_rows, degree) if varies else self.constant(value)
+            field = over_place(s, name, self.grid, self.inner_rows, degree) if varies else self.constant(value)
             self.section[name] = field
         names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")
         root = zip(names_of, s.root_position, strict=True)
