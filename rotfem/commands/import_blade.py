@@ -12,22 +12,26 @@ from rotfem.scene import Scene
 from rotfem.scene.files import apply_overrides
 
 
-def import_blade(file: str | Path, format: str | None = None, changes: Sequence[str] = ()) -> Scene:
+def import_blade(
+    file: str | Path, format: str | None = None, changes: Sequence[str] = (), rigid: bool = False
+) -> Scene:
     """Return the scene of a blade or rotor file, at rest, with nothing in it but that and what is changed.
 
     Args:
         file: the file, of one of the formats in `docs/blades.md`.
         format: its name; None takes what the file says of itself.
         changes: keys that the file leaves open, such as "structure.length=61.5", applied in order.
+        rigid: give stiffnesses that the file leaves open a value at which they add nothing.
 
     Raises:
         SceneError: the file cannot be read, naming line and column; or something that it does not have is missing.
     """
     path = Path(file)
-    section = {"from": str(path.resolve())} | ({} if format is None else {"format": format})
+    section = {"from": str(path.resolve()), "format": format, "rigid": rigid or None}
     tables: dict[str, Any] = {
-        "structure": {"type": "spatial_beam", "section": section},
+        "structure": {"type": "spatial_beam", "section": {k: v for k, v in section.items() if v is not None}},
         "motion": {"type": "constant", "speed": 0.0},
+        "output": {"frequency": "Hz"},
     }
     tables = apply_overrides(path.name, tables, changes)
     scene = Scene.from_dict(tables, path.stem)
