@@ -7,6 +7,9 @@ from collections.abc import Iterable
 #: Part of the length within which two places are one: of a shorter element the stiffness would be round-off to others.
 ONE = 1e-7
 
+#: Length of a jump in time, as a part of the largest time of its table.
+JUMP = 1e-11
+
 #: Type of a beam ↦ its stress resultants at a section (N, N·m), and the strains that they are conjugate to (1, 1/m).
 FORCES = {"planar_beam": ("N", "Q", "M"), "spatial_beam": ("N", "Q2", "Q3", "T", "M2", "M3")}
 STRAINS = {

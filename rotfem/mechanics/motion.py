@@ -10,12 +10,14 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import cos, pi, sin
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.along import JUMP
 from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import FreeHub
 from rotfem.mechanics.loads import Load
@@ -132,7 +134,7 @@ class Motion:
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
-            "sharp": (t[0], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
+            "sharp": tuple(t) if kind == "linear" else (t[0], *t[jumps_of(t)], *t[jumps_of(t) + 1], t[-1]),
             "bent": tuple(t) if kind == "pchip" else (),
             "arrays": True,
         }
@@ -252,17 +254,22 @@ def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scala
     return omega, rate, angle
 
 
+def jumps_of(t: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return which intervals of times are the ramp that two rows of one time are."""
+    return np.flatnonzero(np.diff(t) <= 2 * JUMP * np.max(np.abs(t)))
+
+
 def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) through rows (t, Omega) by "pchip", "cubic" or "linear", constant outside."""
+    """Return (Omega, dOmega/dt, psi) of rows (t, Omega), "pchip", "cubic" or "linear", but for jumps; constant outside."""
     from scipy import interpolate  # only a table needs it, and it is slow to load
 
     t, omega = np.asarray(table, dtype=float).T
-    if kind == "pchip":
-        curve: Any = interpolate.PchipInterpolator(t, omega)
-    elif kind == "cubic":
-        curve = interpolate.CubicSpline(t, omega)
-    else:
-        curve = interpolate.PPoly(np.array([np.diff(omega) / np.diff(t), omega[:-1]]), t)
+    curve: Any = interpolate.PPoly(np.array([np.diff(omega) / np.diff(t), omega[:-1]]), t)
+    if smooth := {"pchip": interpolate.PchipInterpolator, "cubic": interpolate.CubicSpline}.get(kind):
+        curve.c = np.concatenate([np.zeros_like(curve.c), curve.c])
+        for a, b in pairwise([0, *jumps_of(t) + 1, len(t)]):
+            if b - a > 1:
+                curve.c[:, a : b - 1] = smooth(t[a:b], omega[a:b]).c
     slope, area = curve.derivative(), curve.antiderivative()
     first, last = float(t[0]), float(t[-1])  # speed and rate are asked for at arrays of times too
     speed_at, rate_at = one_time(curve), one_time(slope)

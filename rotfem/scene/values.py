@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, Tag, ValidationInfo
 
+from rotfem.along import JUMP
 from rotfem.registry import Registry
 from rotfem.scene.files import FROM_FILE
 from rotfem.scene.table import BY_SHAPE, SceneModel, as_name, problem, unit
@@ -53,10 +54,6 @@ PaddedVector = Annotated[Vector, BeforeValidator(padded)]
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 Rows = tuple[tuple[Number, ...], ...]
-
-
-#: Length of a jump in time, as a part of the largest time of its table.
-JUMP = 1e-11
 
 
 def check_increasing(rows: Any) -> Any:

@@ -209,3 +209,25 @@ CASES += [
         words="the structure has no mass, and so no modes",
     ),
 ]
+
+ARM = {"EA": 1e6, "GA": 1e7, "EI": 100.0, "mass_per_length": 0.0}
+OWN = np.sqrt(1.0 / (2.0 * (1.0 / 300.0 + 1e-7)))  # rad/s, 2 kg at the end of 1 m
+CASES += [
+    Case(
+        "input finer than the step",
+        f"an arm stops at once, table by {kind}, {steps}",
+        {
+            "structure": {"type": "planar_beam", "length": 1.0, "tip_mass": 2.0, "section": ARM},
+            "motion": {"type": "table", "table": [[0, 0.01], [0.501, 0.01], [0.501, 0], [2, 0]], "interpolation": kind},
+            "model": {"theory": "consistent_linear"},
+            "time": {"end": 1.0, **steps},
+            "output": {"error": False},
+        },
+        value=lambda result: np.max(np.abs(result.history["tip_u2"])),
+        reference=0.01 / OWN,
+        tolerance=1e-3,
+        source="ΔΩ L/ω of a mass on a spring",
+    )
+    for kind in ("pchip", "cubic")
+    for steps in ({"step": 0.002}, {"tolerance": 1e-5})
+]
