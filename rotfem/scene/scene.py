@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -205,8 +206,15 @@ class Scene(SceneModel):
             ours = os.path.realpath(start / value) in files and not Path(value).is_absolute()
             return os.path.relpath(start.resolve() / value, path.parent.resolve()) if ours else str(value)
 
+        def joined(array: re.Match[str]) -> str:
+            """Return an array in a line where it fits one."""
+            line = " ".join(array[1].split()).rstrip(",")
+            return f"[{line}]" if len(line) < 100 else array[0]
+
         try:
-            text = tomli_w.dumps(moved(self._tables))
+            text, before = tomli_w.dumps(moved(self._tables)), ""
+            while text != before:
+                before, text = text, re.sub(r'\[\n((?: +(?![ \]])[^"{}=\n]*,\n)+) *\]', joined, text)
         except TypeError:
             why = "holds a Python function, so that it cannot be written as TOML"
             raise SceneError(self._file, allowed=why) from None
