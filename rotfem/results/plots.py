@@ -99,19 +99,12 @@ def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
     return [name for name in columns if name not in zero], title
 
 
-def stacked(
-    x: str,
-    at: Array,
-    columns: Mapping[str, Array],
-    title: str,
-    units: Mapping[str, str] | None = None,
-    below: float = 0.0,
-) -> Figure:
+def stacked(x: str, at: Array, columns: Mapping[str, Array], title: str, below: float = 0.0, **units: str) -> Figure:
     """Return one panel a column, or columns (n, m), over the abscissa x, with marks where it is a position.
 
-    `units` has those that are not the usual ones; `below` is room for a legend, inch.
+    Below them is room for a legend, inch; `units` are those of columns that have not the usual ones.
     """
-    units, (shown, title) = units or {}, not_zero(columns, title)
+    shown, title = not_zero(columns, title)
     figure, panels = panels_over(label(x), len(shown), title, below=below)
     for panel, name in zip(panels, shown, strict=True):
         panel.plot(at, columns[name], lw=1.0 if x == "t" else 1.2, marker="" if x == "t" else ".", ms=4)
@@ -135,7 +128,7 @@ def history_figure(result: RunResult) -> Figure:
         hub = [name for name in hub if not name.startswith("psi")]
         title += f", {units.speeds(speed[0]):.6g} {units.speed}"
     columns = {name: units.speeds(speed) if name == "psi_dot" else history[name] for name in (*tip, *hub)}
-    return stacked("t", history["t"], columns, title, {"psi_dot": units.speed})
+    return stacked("t", history["t"], columns, title, psi_dot=units.speed)
 
 
 def loads_figure(result: RunResult) -> Figure:
@@ -248,11 +241,10 @@ def maps(number: int, mesh: Triangulation, title: str) -> tuple[Figure, list[Axe
     figure.suptitle(title, fontsize=10, wrap=True)
     axes = [figure.add_subplot(rows, columns, i + 1) for i in range(number)]
     for i, axis in enumerate(axes):
-        axis.set_aspect("equal")
+        left, lowest = i % columns == 0, i + columns >= number
+        axis.set(aspect="equal", xlabel="x (m)" * lowest, ylabel="y (m)" * left)
         axis.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        axis.tick_params(labelsize=7, labelleft=i % columns == 0, labelbottom=i + columns >= number)
-        axis.set_xlabel("x (m)" if i + columns >= number else "", fontsize=8)
-        axis.set_ylabel("y (m)" if i % columns == 0 else "", fontsize=8)
+        axis.tick_params(labelsize=7, labelleft=left, labelbottom=lowest)
     return figure, axes
 
 

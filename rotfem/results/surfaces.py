@@ -86,8 +86,7 @@ class Surface:
         Displacements by larger turns, as of a thin shaft in torsion, are not linear.
         """
         turns = [np.abs(values) / self.length for name, values in shape.items() if name.startswith(("theta", "alpha"))]
-        largest = np.max(np.abs(self.moved(shape)))
-        return float(WARP / max(largest / self.size, WARP * np.max(turns, initial=0.0), 1e-300))
+        return 1.0 / float(max(np.max(np.abs(self.moved(shape))) / (WARP * self.size), np.max(turns, initial=1e-300)))
 
     def displaced(self, columns: Mapping[str, Array]) -> Array:
         """Return the displacements (k, 3), m, of the points by components at the nodes: u1, … (m), theta1, … (rad)."""

@@ -24,6 +24,7 @@ from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_bu
 from rotfem.scene.loads import LoadsTable, check_in_plane, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
+    NO_STEPS,
     AngularUnit,
     BeamMesh,
     Initial,
@@ -255,6 +256,8 @@ class Scene(SceneModel):
                 f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
             )
             raise SceneError(self._file, "time", None, why)
+        if self.time is not None and self.time.step is None and self.time.tolerance is None:
+            raise SceneError(self._file, "time.step", None, NO_STEPS)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
 
