@@ -266,9 +266,9 @@ class Sweep:
         found, count = self.known.pop(speed, None), self.count + SPARE
         self.solves += found is None
         if found is None and self.model is not None:
-            found = with_errors(self.model.modes(speed, count))
+            found = with_errors(self.model.modes(speed, count).first(count))
         found = found or self.analysis.at(speed, count, start)
-        return SpeedPoint(found.first(count), requested)
+        return SpeedPoint((found if self.model is None else self.model.inside(found)).first(count), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds.

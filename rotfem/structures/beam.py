@@ -162,25 +162,11 @@ class Beam(Structure):
         """Return what a family is called in names of modes.
 
         A blade bends flapwise and edgewise. A beam on a free hub, or of round sections, which have no edge, is none: it
-        bends in the plane of rotation and out of it, which is that of directions 1 and 2 unless the axis is nearer
-        to direction 2.
+        bends in the plane of rotation and out of it.
         """
-        words = WORDS.get(family)
-        if words is None:
-            return family
-        if self.problem.motion.hub is None and not getattr(self.data, "has_round_sections", False):
-            return words[0]
-        _, y, z = np.abs(self.problem.motion.axis)
-        return words[1] if z >= y else next(other[1] for other in WORDS.values() if other != words)
-
-    def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
-        """Return whether a shape (n, components) is that of a rigid body, but for 0.5 % of its largest displacement."""
-        places, (u, turns) = self.places(coordinates), np.zeros((2, len(values), 3), dtype=complex)
-        u[:, : self.dimension] = values[:, : self.dimension]
-        for axis, component in self.turns_of.items():
-            turns[:, axis - 1] = values[:, component]
-        strained = u - u[0] - np.cross(turns[0], places - places[0]), self.length * (turns - turns[0])
-        return bool(np.max(np.abs(strained)) <= 5e-3 * max(np.max(np.abs(u)), self.length * np.max(np.abs(turns))))
+        blade = self.problem.motion.hub is None and not getattr(self.data, "has_round_sections", False)
+        y, z = np.abs(self.problem.motion.axis[1:])
+        return WORDS[family][0 if blade else 1 + int(y > z)] if family in WORDS else family
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode shape (n, components) by its family and its number, one more than its nodes."""

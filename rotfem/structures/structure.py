@@ -538,16 +538,24 @@ class Structure:
         return family
 
     def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
-        """Return whether a shape at the nodes (n, components) is a motion of a rigid body, as far as known."""
-        return False
+        """Return whether a shape (n, components) is that of a rigid body, but for 0.5 % of its largest displacement."""
+        places, (u, turns) = self.places(coordinates), np.zeros((2, len(values), 3), dtype=complex)
+        u[:, : np.sum(self.moves)] = values[:, self.moves]
+        for axis, component in self.turns_of.items():
+            turns[:, axis - 1] = values[:, component]
+        strained = u - u[0] - np.cross(turns[0], places - places[0]), self.length * (turns - turns[0])
+        return bool(np.max(np.abs(strained)) <= 5e-3 * max(np.max(np.abs(u)), self.length * np.max(np.abs(turns))))
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor."""
-        return None
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return how modes e^{iωt} precess about an axis, from their complex shapes (modes, nodes, components).
+
+        Empty unless a rotor.
+        """
+        return []
 
     def oriented(self, values: Array) -> Array:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
