@@ -202,9 +202,8 @@ class Scene(SceneModel):
     def check_run(self) -> None:
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
-            why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
-            )
+            how = "give its end, and step, tolerance or an accuracy"
+            why = f'missing; with motion.type = "{self.motion.type}" a run is a history: {how}'
             raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
