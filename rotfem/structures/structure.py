@@ -226,6 +226,8 @@ class Structure:
     tip_inputs: ClassVar[tuple[str, ...]]
     #: Family of modes ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
+    #: Family ↦ its word in names of modes, where that is another one.
+    words: dict[str, str] = {}
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.
@@ -532,10 +534,6 @@ class Structure:
     def surface(self) -> npt.NDArray[np.int64] | None:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
-
-    def word(self, family: str) -> str:
-        """Return what a family is called in names of modes."""
-        return family
 
     def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
         """Return whether a shape (n, components) is that of a rigid body, but for 0.5 % of its largest displacement."""
