@@ -413,10 +413,10 @@ def check_loads(structure: Any, motion: Any, loads: LoadsTable) -> None:
         if motion.is_free and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
             raise problem(f"{key}.harmonic.per_rev", per_rev, why)
-    known = structure.thickness if structure.type == "plate" and isinstance(structure.thickness, dict) else {}
+    known = structure.regions if structure.type == "plate" else ()
     for name in () if loads.pressure is None else loads.pressure.regions or ():
         if name not in known:
-            has = f"there are {', '.join(known)}" if known else "structure.thickness must be by region"
+            has = f"there are {', '.join(known)}" if known else "nothing of structure is by region"
             raise problem(f"loads.pressure.regions.{name}", None, f"is no region of the plate; {has}")
 
 

@@ -75,7 +75,7 @@ mesh.elements=2.0 -> integer
 mesh.elements=[2,2] -> integer
 mesh.degree=7 -> at most 6
 mesh.cell='triangle' -> unknown key
-time={end=1.0} -> @time.step give step
+time={end=1.0, step=0.1, tolerance=1e-4} -> @time.step not both
 time={step=0.1} -> @time.end required key is missing
 time={end=1.0, step=0} -> @time.step greater than 0
 time={end=1.0, step=2} -> @time.step at most time.end

@@ -230,6 +230,9 @@ def test_check_run() -> None:
     with pytest.raises(SceneError, match="spin_up") as caught:
         scene(motion=SPIN_UP).check_run()
     assert caught.value.key == "time"
+    with pytest.raises(SceneError, match="accuracy = 1e-3 beside") as caught:
+        scene(motion=SPIN_UP, time={"end": 1}).check_run()
+    assert caught.value.key == "time.step"
     for key, start in (("tip_displacement", 0.1), ("velocity", [[0, 0, 0], [10, 0, 1]])):
         with pytest.raises(SceneError, match=r"needs \[time\]") as caught:
             scene(initial={key: start}).check_run()
