@@ -226,8 +226,6 @@ class Structure:
     tip_inputs: ClassVar[tuple[str, ...]]
     #: Family of modes ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
-    #: Family ↦ its word in names of modes, where that is another one.
-    words: dict[str, str] = {}
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.
@@ -253,6 +251,8 @@ class Structure:
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
         self.load_constants: dict[str, Amplitude] = {}
+        #: Family ↦ its word in names of modes, where that is another one.
+        self.words: dict[str, str] = {}
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
         self.size = len(self.active) + len(self.extra)
