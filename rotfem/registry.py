@@ -7,6 +7,7 @@ user's script adds others with `register`, and their names are then valid values
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
@@ -36,13 +37,16 @@ class Registry(Generic[E]):
     def __init__(self, kind: str, *homes: str):
         self.kind, self._homes = kind, homes
         self._entries: dict[str, E] = {}
+        self._noted: set[str] = set()
 
-    def add(self, entry: E) -> None:
-        """Add an entry."""
+    def add(self, entry: E, replace: bool = False, noted: bool = False) -> None:
+        """Add an entry; it may replace another one, or both are noted: of a notebook."""
         self._load()
-        if entry.name in self._entries:
-            raise ValueError(f"{entry.name!r} is the name of another {self.kind} already")
+        if entry.name in self._entries and not (replace or (noted and entry.name in self._noted)):
+            raise ValueError(f"{entry.name!r} is the name of another {self.kind} already; replace=True takes its place")
         self._entries[entry.name] = entry
+        if noted:
+            self._noted.add(entry.name)
 
     def remove(self, name: str) -> None:
         """Take an entry out again, as a test does with its own."""
@@ -91,17 +95,20 @@ structures: Registry[Any] = Registry("structure", "rotfem.scene.structure")
 ALL: tuple[Registry[Any], ...] = tuple(registry for registry in globals().values() if isinstance(registry, Registry))
 
 
-def register(entry: Entry | type[Entry]) -> None:
+def register(entry: Entry | type[Entry], replace: bool = False) -> None:
     """Add an entry to the registry of its kind: its name is then a valid value of a scene.
+
+    A cell of a notebook, or a prompt, may register a name of its own again, which replaces the entry.
 
     Args:
         entry: a `Theory`, `Effect`, `DampingModel`, `StructureKind`, `Shape`, `Output` or `BladeFormat`, or a class of
             `Scheme` or `MotionLaw`.
+        replace: whether it may take the place of another one of its name.
 
     Raises:
         ValueError: its name is taken.
     """
-    entry.registry.add(entry)
+    entry.registry.add(entry, replace, "__file__" not in sys._getframe(1).f_globals)
 
 
 def resolved(function: str | Callable[..., Any]) -> Callable[..., Any]:

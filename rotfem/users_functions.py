@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,6 +24,17 @@ def called(key: str, what: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise InputError(key, None, f"{what} raised {type(error).__name__}: {error}") from error
+
+
+@contextmanager
+def of_unknowns(components: Sequence[str]) -> Iterator[None]:
+    """Let an error of a user's function that takes an entry too far say what the unknowns are."""
+    try:
+        yield
+    except (IndexError, ValueError) as error:  # UFL's
+        if "out of bounds" in str(error):
+            error.args = (f"{error} q has {len(components)} entries ({', '.join(components)})",)
+        raise
 
 
 def number_of(function: Callable[..., Any], key: str, of: str) -> Callable[..., float]:

@@ -7,14 +7,18 @@ in haste, as most are used for few steps on few cells: that takes half the time.
 from __future__ import annotations
 
 import gc
+import importlib.metadata
 import os
 import sys
+from functools import cache
 
 import pytest
 
 os.environ.setdefault("ROTFEM_HASTE", "1")  # before rotfem is imported, and for the processes that tests start
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each of these would translate the package anew, 0.3 s
 sys.dont_write_bytecode = False
+# setuptools asks six times for each form what all installed packages offer: half of the time of a small one.
+importlib.metadata.entry_points = cache(importlib.metadata.entry_points)
 gc.set_threshold(100_000)  # expressions of UFL are many small objects in use, and looked at for nothing
 
 

@@ -230,7 +230,7 @@ class BranchPath:
         def g(x: float) -> float:
             return known[x] if x in known else f(self.joined(self.model.modes(x)))
 
-        speed = float(brentq(g, *known, xtol=1e-300, rtol=ZEROS))
+        speed = float(brentq(g, *known, xtol=ZEROS * (high.speed - low.speed), rtol=ZEROS))
         return speed if abs(g(speed)) < 1e-2 * min(map(abs, known.values())) + 1e-6 * abs(speed) else None
 
 
@@ -266,9 +266,9 @@ class Sweep:
         found, count = self.known.pop(speed, None), self.count + SPARE
         self.solves += found is None
         if found is None and self.model is not None:
-            found = with_errors(self.model.modes(speed, count))
+            found = with_errors(self.model.modes(speed, count).first(count))
         found = found or self.analysis.at(speed, count, start)
-        return SpeedPoint(found.first(count), requested)
+        return SpeedPoint((found if self.model is None else self.model.inside(found)).first(count), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds.

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import chain, pairwise
 from typing import Any
 
@@ -24,10 +25,10 @@ from rotfem.analysis.schemes import LONGEST, Array, Observer, Pace, Scheme, Shif
 from rotfem.analysis.time_grid import Interval, intervals, knots_of
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
-from rotfem.mechanics.time_signals import SAME, View
+from rotfem.mechanics.time_signals import SAME, View, has_ends
 from rotfem.numerics.linear import DirectSolver, combine
 from rotfem.numerics.newton import REACH, Factor, Newton
-from rotfem.numerics.projection import sparse_part, times, with_ghosts
+from rotfem.numerics.projection import PlusLowRank, sparse_part, with_ghosts
 
 
 @dataclass(frozen=True)
@@ -162,9 +163,8 @@ class March:
         """Yield the states at step, 2 step, … and end (s); the last step may be shorter."""
         steps, step, reached = self.steps, float(self.steps.step or 0.0), state.t
         times = np.append(np.arange(int(np.ceil(steps.end / step - 1e-9))) * step, steps.end)
-        divided = self.scheme.order > 2
-        knots = knots_of(self.system.signals, times, steps.breakpoints, divided)
-        grid = (part for part in intervals(knots, times, step, divided) if part.end > reached)
+        knots = knots_of(self.system.signals, times, steps.breakpoints, self.scheme.order > 2)
+        grid = (part for part in intervals(*knots, times, step) if part.end > reached)
         for part, after in pairwise(chain(grid, [None])):
             assert part is not None
             start = self.begun(state, View(1), part) if state.t == 0.0 else state
@@ -190,9 +190,7 @@ class March:
         end, tolerance = float(self.steps.end), float(self.steps.tolerance or 0.0)
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
-        signals = self.system.signals
-        found = knots_of(signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
-        knots = np.unique(np.concatenate([found, *(s.bent for s in signals)]))
+        knots, _ = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 
@@ -243,7 +241,7 @@ class March:
         """Return an interval from a state on that is about as long as wanted.
 
         It ends at a knot where a signal may jump or have a kink, unless what it loses of the signals is negligible:
-        then they are their best cubics in it.
+        then cubics replace them in it.
         """
         t, end = state.t, float(self.steps.end)
         left = end - t
@@ -255,7 +253,7 @@ class March:
             return Interval(stop, h, at_knot=bool(at))
         fitted = Interval(stop, h, line=(t, stop, 3))
         inside = knots[first:last]
-        if len(inside) > 1 and self._lost(state, fitted, inside, error) <= allowed:
+        if self._lost(state, fitted, inside, error) <= allowed:
             return fitted
         stop = float(inside[0])
         return Interval(stop, stop - t, at_knot=True)
@@ -272,12 +270,12 @@ class March:
         off = sum(signal.deviation(times, *part.line) for signal in s.signals)
         t, c = float(times[int(np.argmax(off))]), np.pi * n / part.length
         s.count_rotations_from(state.reference)
-        moved = []
+        moved = list[Array]()
         for view in (View(-1), View(0, part.line)):
             with s.view.as_in(view):
                 s.set_time(t)
                 s.set_state(state.q, state.v, state.a)
-                moved.append(np.array(s.correction((1.0, c, c * c))))
+                moved.append(s.chord() if moved else s.correction((1.0, c, c * c)))
         return error.size(moved[1] - moved[0]) * self.steps.end / part.length
 
     # --- one step ----------------------------------------------------------------------------------------------------
@@ -384,7 +382,7 @@ class March:
         `before` is how the step that ends with it evaluates signals.
         """
         after = View(1, part.line)
-        if before.side == 0 and before.line == part.line:
+        if before.side == 0 and (before.line == part.line or (has_ends(before.line) and has_ends(part.line))):
             return state
         s, t = self.system, state.t
         s.count_rotations_from(state.reference)
@@ -503,24 +501,33 @@ class LocalError:
         system.set_time(0.0, system.model.problem.motion)  # of a free hub the speed it starts with, not of now
         system.set_state(system.zeros())
         self._matrices = system.with_hub(system.mass_damping_stiffness())
-        self._owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
-        self._bucket: int | None = None
-        self._solvers: list[DirectSolver] = []
+        self._x, self._b = sparse_part(self._matrices[0]).createVecs()
+        s = system.structure
+        moved = dict(zip(s.components, np.where(s.moves, 1.0, s.radius / s.length), strict=True))
+        nodes = len(system.scale) // len(s.unknowns)
+        self._weights = np.tile([moved[name] for name in s.unknowns], nodes) / system.scale
+        self._filters = lru_cache(maxsize=4)(self._made)
 
     def __call__(self, error: Array | None, h: float) -> float:
         """Return the largest displacement of an error of q (local dof array), scaled, at the end of the history."""
         assert error is not None
-        M, bucket = self._matrices[0], round(np.log(h) / np.log(COARSE))
-        if bucket != self._bucket:
-            self._bucket, self._solvers = bucket, self._made(COARSE**bucket)
-        e = np.full((M.getLocalSize()[0], 1), error[-1])  # the last process has the angle of a hub
-        e[: self._owned, 0] = error[: self._owned]
-        (adds_up, remains), n = self._solvers, (self.scheme.estimate[1] + 1) // 2
-        once, often = remains.solve_all(times(M, e)), e
-        for _ in range(n):
-            often = adds_up.solve_all(times(M, often))
-        sizes = [self.size(with_ghosts(self.system.V, x[: self._owned, 0])) for x in (often, once)]
+        adds_up, remains = self._filters(COARSE ** round(np.log(h) / np.log(COARSE)))
+        e = np.full(self._x.getLocalSize(), error[-1])  # the last process has the angle of a hub
+        owned = self.system.V.dofmap.index_map.size_local * self.system.V.dofmap.index_map_bs
+        e[:owned] = error[:owned]
+        once, often = self._filtered(remains, e), e
+        for _ in range((self.scheme.estimate[1] + 1) // 2):
+            often = self._filtered(adds_up, often)
+        sizes = [self.size(with_ghosts(self.system.V, x[:owned])) for x in (often, once)]
         return max(4.0 * self.end / h * sizes[0], 2.0 * sizes[1])
+
+    def _filtered(self, filter: DirectSolver, e: Array) -> Array:
+        """Return F e of owned rows."""
+        M, self._x.array[:] = self._matrices[0], e
+        sparse_part(M).mult(self._x, self._b)
+        if isinstance(M, PlusLowRank):
+            self._b.array[:] += M.added(e)
+        return filter.solve(self._b)
 
     def _made(self, h: float) -> list[DirectSolver]:
         """Return the filters of what adds up, and of unresolved vibrations, for steps of h (s)."""
@@ -532,8 +539,8 @@ class LocalError:
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of points of the sections in a local dof array, over the length."""
-        n = len(self.system.scale)
-        return float(self.system.displaced(x[:n]).max() / self.system.structure.length)
+        here = float(np.max(np.abs(x[: len(self._weights)]) * self._weights, initial=0.0))
+        return self.system.comm.allreduce(here, MPI.MAX) if self.system.shared else here
 
     def displacement(self, state: State) -> float:
         """Return the largest displacement of a state relative to the turning frame, in units of its scale."""

@@ -148,7 +148,10 @@ class Spinning:
 
     def first(self, count: int) -> Spinning:
         """Return it with its first modes alone."""
-        return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))))
+        out = replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))))
+        if "waves" in self.__dict__:
+            out.waves = self.waves[:count]
+        return out
 
     @cached_property
     def _energies(self) -> Array:
@@ -181,15 +184,11 @@ class Spinning:
 
         The sense of the spin counts, without spin that of its axis.
         """
-        axis = np.asarray(self.analysis.system.motion.axis) * (-1.0 if self.speed < 0.0 else 1.0)
-        found = []
-        for x in self.right.T:
-            coordinates, values = self.analysis.structure.nodes(x)
-            wave = self.analysis.structure.wave(coordinates, values, axis)
-            if wave is None:
-                return []
-            found.append(replace(wave, fixed=self.analysis.fixed))
-        return found
+        axis = self.analysis.system.motion.axis * (-1.0 if self.speed < 0.0 else 1.0)
+        nodes = [self.analysis.structure.nodes(x) for x in self.right.T]
+        shapes = np.array([values for _, values in nodes])
+        found = self.analysis.structure.waves(nodes[0][0], shapes, axis) if nodes else []
+        return [replace(wave, fixed=self.analysis.fixed) for wave in found]
 
     @cached_property
     def names(self) -> list[ModeName]:
@@ -198,21 +197,20 @@ class Spinning:
         One that nothing holds, zero to round-off, is "rigid body".
         """
         families, structure = [name for name in self.shares if name != "hub"], self.analysis.structure
-        out, rigid = [], []
-        for j, x in enumerate(self.right.T):
+        out, shapes = [], [structure.nodes(x) for x in self.right.T]
+        for j, shape in enumerate(shapes):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            nodes = structure.nodes(x)
-            name = structure.mode_name(first, *nodes)
-            mixed = others and self.shares[first][j] < 0.8
-            out.append(name.mixed_with(structure.word(others[0])) if mixed else name)
-            rigid.append(bool(self.pairs.bounds[j] >= 1.0 and structure.is_rigid(*nodes)))
+            name, mixed = structure.mode_name(first, *shape), others and self.shares[first][j] < 0.8
+            out.append(name.mixed_with(structure.words.get(others[0], others[0])) if mixed else name)
         pencil, pairs, speed = self.pencil, self.pairs, self.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
             sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
             out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
         out = with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
-        return [RIGID_BODY if alone else name for name, alone in zip(out, rigid, strict=True)]
+        for j in np.flatnonzero(pairs.bounds >= 1.0):
+            out[j] = RIGID_BODY if structure.is_rigid(*shapes[j]) else out[j]
+        return out
 
 
 def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
@@ -353,7 +351,7 @@ class ModalAnalysis:
         return found
 
     def restored(self, speed: float, q: Array, pairs: Eigenpairs, rigid: bool, reference: Any = None) -> Spinning:
-        """Return what `at` has found before, or on another process, of its parts."""
+        """Return what `at` has found before, of its parts."""
         self.system.count_rotations_from(reference)
         pencil, clamped = self.pencils(speed, q)
         return Spinning(self, speed, q, pencil, pairs, clamped, rigid, reference)

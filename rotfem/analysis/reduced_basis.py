@@ -4,9 +4,10 @@ With the columns V of modes at some speeds, (λ² M + λ C + K) x = 0 becomes th
 which keeps symmetry and skewness. Over the speed Ω these are the polynomials through what they are at some nodes
 (Lagrange):
 
-- In a linear theory they are of second degree in Ω, so three nodes make them exact. The basis grows until full
-  solutions at speeds between agree, and all modes of a diagram are those of one model (`over_range`).
-- In the other theories two speeds that are solved, and those next to them, are the nodes (`between`). K is a polynomial
+- About an equilibrium that is the same at all speeds, as in a linear theory and of a shaft in the fixed frame, they are
+  of second degree in Ω, so three nodes make them exact. The basis grows until full solutions at speeds between agree,
+  and all modes of a diagram are those of one model (`over_range`).
+- Elsewhere two speeds that are solved, and those next to them, are the nodes (`between`). K is a polynomial
   of Ω² then, as the centrifugal force that the equilibrium follows.
 """
 
@@ -24,15 +25,18 @@ from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, product
 from rotfem.errors import ComputationError
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, backward_errors, relative
+from rotfem.numerics.eigenproblem import BACKWARD_TOLERANCE, Eigenpairs, Pencil, RoundOff, backward_errors, relative
 from rotfem.numerics.linear import ROUNDED, unknown_scale
-from rotfem.numerics.projection import dense, spanned, summed, times
-from rotfem.numerics.ritz import heavily_damped, quadratic
+from rotfem.numerics.projection import spanned, summed, times
+from rotfem.numerics.ritz import MORE, TINY, heavily_damped, quadratic, smoothest
 
 Array = npt.NDArray[Any]
 
 #: Speeds from which a basis saves time: it takes three full solutions at least.
 MANY = 3
+
+#: Least parts of vectors in the basis over a range, whose square is left in eigenvalues; equilibria that are one.
+PARTS, EQUAL_EQUILIBRIA = 1e-8, 1e-12
 
 #: Modes of a model beyond those that are known at its speeds: those that a branch may pass through.
 FURTHER = 3
@@ -67,12 +71,14 @@ class SmallPencil(Pencil):
         values, x, y = found or quadratic(self.M, self.C, self.K, target)
         first = np.arange(min(2 * count + 2, len(values)))
         if self.damped and heavily_damped(values[first][self.stiff(x[:, first])]):
-            whole = (dense(MPI.COMM_SELF, A).convert("aij") for A in (self.M, self.C, self.K))
-            return Pencil(*whole).solve(count, target)
-        telling = (values.real >= 0.0) | (not self.conservative)
-        upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
-        order = upper[np.argsort(np.abs(values[upper]), kind="stable")[:count]]
-        values, x, y = values[order], x[:, order], y[:, order]
+            size = float(norm(self.K, np.inf))
+            more = min(2 * count, count + MORE)
+            values, x, y = smoothest((values, x, y), (self.M, self.C, self.K), more, size)
+        else:
+            telling = (values.real >= 0.0) | (not self.conservative)
+            upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
+            order = upper[np.argsort(np.abs(values[upper]), kind="stable")[:count]]
+            values, x, y = values[order], x[:, order], y[:, order]
         MX, CX, KX = np.split(product(np.vstack([self.M, self.C, self.K]), x), 3)
         n = np.sum(y.conj() * (2 * values * MX + CX), axis=0)
         residual = values**2 * MX + values * CX + KX
@@ -119,22 +125,31 @@ class SpeedModel:
         nodes: speed (rad/s) and pencil of each place that the polynomials go through.
         even: whether K is a polynomial of Ω², or else of Ω.
         count: number of modes.
+        least: parts of vectors that the basis may lack.
 
     Attributes:
         lift: V, and M V at the first node.
         checks: speeds of full solutions, with the largest relative difference of a frequency there.
+        rest: equilibrium of all speeds, if it is one.
     """
 
     def __init__(
-        self, analysis: ModalAnalysis, vectors: Array, nodes: Iterable[tuple[float, Pencil]], even: bool, count: int
+        self,
+        analysis: ModalAnalysis,
+        vectors: Array,
+        nodes: Iterable[tuple[float, Pencil]],
+        even: bool,
+        count: int,
+        least: float = 1e-10,
     ):
         self.analysis, self.count, self._even = analysis, count, even
+        self.rest: Array = np.empty(0)
         self.checks: list[dict[str, float]] = []
         speeds, matrices, self._asymmetries = list[float](), list[list[Array]](), dict.fromkeys("MCK", 0.0)
         for speed, pencil in nodes:
             if not speeds:
                 scale = unknown_scale(pencil.M, pencil.K, 1.0).array[:, None]
-                inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]) / scale)
+                inner = spanned(pencil.comm, np.hstack([vectors.real, vectors.imag]) / scale, least)
                 self.comm, V, self._dual = pencil.comm, scale * inner, inner / scale
             products = [times(A, V) for A in (pencil.M, pencil.C, pencil.K)]
             if not speeds:
@@ -178,7 +193,7 @@ class SpeedModel:
         except ComputationError:  # K is singular: aim beside zero
             least = np.min(np.abs(np.linalg.eigvals(np.linalg.solve(pencil.M, pencil.K)))[1:])
             pairs = pencil.first(count, 0.1 * float(np.sqrt(least)))
-        return Spinning(self.analysis, speed, np.empty(0), pencil, pairs, pencil, lift=self.lift)
+        return Spinning(self.analysis, speed, self.rest, pencil, pairs, pencil, lift=self.lift)
 
     def singular(self, low: float, high: float) -> Array:
         """Return the speeds between two at which K is singular, increasing; K is taken to be linear in Ω² there."""
@@ -216,34 +231,44 @@ def between(solved: Sequence[Spinning], neighbours: Sequence[Spinning]) -> Speed
 def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> SpeedModel | None:
     """Return a model of all modes at some speeds (rad/s) where that is possible and saves time, else None.
 
-    It is possible of a linear theory in the rotating frame with a fixed hub. The basis begins with the modes at both
-    ends, and grows until frequencies halfway between known speeds are those of the full system to 1e-6.
+    It is possible about one equilibrium of all speeds, with supports that are the same at all, and a fixed hub. The
+    basis begins with the modes at both ends, and grows until frequencies halfway between known speeds are those of the
+    full system to 1e-6.
     """
     system, first, last = analysis.system, speeds[0], speeds[-1]
-    if not system.linear or analysis.free or len(speeds) < MANY:
+    supports = analysis.model.frame.of_supports.values()
+    if analysis.free or len(speeds) < MANY or not (system.linear or analysis.fixed):
         return None
-    rest, columns, checks, gaps = system.zeros(), list[Array](), list[dict[str, float]](), [(first, last)]
+    if any(not np.array_equal(of(first), of(speed)) for of in supports for speed in speeds):
+        return None
+    columns, checks, gaps = list[Array](), list[dict[str, float]](), [(first, last)]
 
-    def solved(speed: float) -> Array:
-        pairs = analysis.at(speed, count, keep=False).pairs
-        columns.append(pairs.right)
-        return pairs.values
+    def solved(speed: float, start: Spinning | None = None) -> Spinning:
+        found = analysis.at(speed, count, start, keep=False)
+        columns.append(found.pairs.right[:, :count])
+        if not found.pencil.conservative:
+            columns.append(found.pairs.left[:, :count])
+        return found
 
     def model() -> SpeedModel:
         nodes = ((speed, analysis.pencils(speed, rest, keep=False)[0]) for speed in (first, 0.5 * (first + last), last))
-        return SpeedModel(analysis, np.hstack(columns), nodes, False, count)
+        out = SpeedModel(analysis, np.hstack(columns), nodes, False, count, PARTS)
+        out.rest = rest
+        return out
 
-    solved(first)
-    solved(last)
-    if analysis.mixed.used:  # whose digits the model does not keep
+    start = solved(first)
+    rest = start.q
+    moved = system.size(solved(last, start).q - rest)
+    if moved > EQUAL_EQUILIBRIA or analysis.mixed.used:  # whose digits the model does not keep
         return None
     found = model()
     while gaps and len(checks) < 7:
         low, high = gaps.pop(0)
         middle = 0.5 * (low + high)
-        exact, near = solved(middle), found.modes(middle, count).pairs.values
-        n = min(count, len(near), len(exact))
-        error = float(np.max(np.abs(near[:n] - exact[:n]) / np.abs(exact[:n]), initial=0.0))
+        exact, near = solved(middle, start).pairs, found.modes(middle, count).pairs
+        n = min(count, len(near.values), len(exact.values))
+        apart = np.abs(near.resolved[:n] - exact.resolved[:n]) / np.maximum(np.abs(exact.values[:n]), TINY)
+        error = float(np.max(apart, initial=0.0))
         checks.append({"speed": middle, "difference": error})
         found = model()
         gaps += [(low, middle), (middle, high)] if error > 1e-6 else []
@@ -251,13 +276,17 @@ def over_range(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> 
     return None if gaps else found
 
 
-def with_errors(found: Spinning) -> Spinning:
-    """Return modes of a model over a range, with their errors in the full system."""
+def with_errors(found: Spinning) -> Spinning | None:
+    """Return modes of a model over a range, with their errors in the full system; None where these are too large."""
     analysis = found.analysis
-    pencil = analysis.pencils(found.speed, analysis.system.zeros(), keep=False)[0]
+    pencil = analysis.pencils(found.speed, found.q, keep=False)[0]
+    pencil.asymmetries = found.pencil.asymmetries
     values, right, left = found.pairs.values, found.right, found.lifted(found.pairs.left)
     values, bounds = RoundOff(pencil).corrected(values, left, right)
-    found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=backward_errors(pencil, values, right))
+    errors = backward_errors(pencil, values, right)
+    if np.max(errors) > BACKWARD_TOLERANCE:
+        return None
+    found.pairs = replace(found.pairs, values=values, bounds=bounds, errors=errors)
     separated = replace(found, pencil=pencil)
     analysis.separate(separated)
     return found

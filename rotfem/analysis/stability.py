@@ -15,7 +15,7 @@ section 7.1). Where follower forces make K unsymmetric, there is no such count, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -40,9 +40,15 @@ from rotfem.numerics.linear import (
 )
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
+from rotfem.structures.structure import Structure
 from rotfem.units import speed_text
 
 Array = npt.NDArray[np.float64]
+
+
+#: Part of a motion that cells of one degree less would not have, above which the mesh does not resolve it: half a wave
+#: over a cell of degree 2 has 0.19 of it, a quarter of a wave 0.01.
+UNRESOLVED = 0.1
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,7 @@ class Stability:
         frequency: of the motion that grows at that rate, rad/s; 0 for a divergence.
         complete: whether no faster growth can have been missed.
         lost: whether a motion's growth is smaller than what round-off does to it.
+        coarse: whether the mesh does not resolve the motion that grows at that rate.
     """
 
     negative: int | None = 0
@@ -62,11 +69,12 @@ class Stability:
     frequency: float = 0.0
     complete: bool = True
     lost: bool = False
+    coarse: bool = False
 
     @property
     def stable(self) -> bool | None:
-        """Whether no small disturbance grows; None where round-off hides it."""
-        if self.lost and self.growth == 0.0:
+        """Whether no small disturbance grows; None where round-off or the mesh hides it."""
+        if self.coarse or (self.lost and self.growth == 0.0):
             return None
         return self.growth == 0.0 and (self.complete or not self.negative)
 
@@ -84,6 +92,11 @@ class Stability:
             )
         if self.stable:
             return ""
+        if self.coarse:
+            return (
+                "unresolved equilibrium: on this mesh a disturbance with waves as short as its cells grows as "
+                f"exp({self.growth:.6g} t), which a finer mesh may not have; more mesh.elements, or cells less oblong"
+            )
         if self.stable is None:
             return "whether the equilibrium is stable is lost in round-off"
         if self.growth == 0.0:
@@ -117,53 +130,56 @@ def stability_of(system: System, q: Array, speed: float) -> Stability:
         return Stability()
     matrices = (system.matrix(0.0, 0.0, 1.0, 0.0), system.matrix(0.0, 1.0, 0.0, 0.0), K)
     clamped = Pencil(*matrices)
-    return stability_of_pencil(clamped if system.hub is None else Pencil(*system.with_hub(matrices)), clamped)
+    pencil = clamped if system.hub is None else Pencil(*system.with_hub(matrices))
+    return stability_of_pencil(system.structure, pencil, clamped)
 
 
-def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
-    """Return the stability of the equilibrium that M, C and K are about."""
+def stability_of_pencil(structure: Structure, pencil: Pencil, clamped: Pencil) -> Stability:
+    """Return the stability of the equilibrium of a structure that M, C and K are about."""
     negative = None if clamped.factor is None else clamped.factor.negative
     negative = negative_count(clamped.K) if negative is None else negative
     if negative == 0:
         return Stability()
     if pencil is clamped:
-        return by_motions(pencil, negative)
+        return by_motions(structure, pencil, negative)
     # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
-    return by_motions(pencil, None, clamped.scale())
+    return by_motions(structure, pencil, None, clamped.scale())
 
 
-def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
+def by_motions(structure: Structure, pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
     """Return the stability that the eigenvalues of M, C and K decide."""
     count = 8 if negative is None else max(8, 2 * negative + 2)
     gyroscopic = negative is not None and not symmetric(pencil.C)  # forces that may stabilise it
     if negative and negative_count(pencil.K, sure=True) == 0:
         return Stability(negative, complete=False, lost=True)
-    growth = frequency = 0.0
+    found = Stability(negative)
     while True:
         try:
             pairs = pencil.solve(count, target)
         except ComputationError:
-            return Stability(negative, growth, frequency, complete=False)
-        values, bounds = pairs.values, pairs.bounds
+            return replace(found, complete=False)
         if target > 0.0:
-            values, bounds = values[bounds < 1.0], bounds[bounds < 1.0]
+            pairs = pairs.select(np.flatnonzero(pairs.bounds < 1.0))
+        values = pairs.values
         # Growth that round-off can have made is none.
-        grows = values[values.real > np.maximum(GROWTH, bounds) * np.abs(values)]
-        lost = len(grows) < int(np.sum(values.real > GROWTH * np.abs(values)))
+        grows = np.flatnonzero(values.real > np.maximum(GROWTH, pairs.bounds) * np.abs(values))
+        found = replace(found, lost=len(grows) < int(np.sum(values.real > GROWTH * np.abs(values))))
         if len(grows):
-            fastest = grows[np.argmax(grows.real)]
-            growth = float(fastest.real)
-            frequency = float(fastest.imag) if fastest.imag > EQUAL_EIGENVALUES * abs(fastest) else 0.0
+            fastest = grows[np.argmax(values.real[grows])]
+            rate, omega = float(values[fastest].real), float(values[fastest].imag)
+            omega = omega if omega > EQUAL_EIGENVALUES * abs(values[fastest]) else 0.0
+            coarse = structure.unresolved(pairs.right[:, fastest]) > UNRESOLVED
+            found = replace(found, growth=rate, frequency=omega, coarse=coarse)
         if negative is None:
-            return Stability(None, growth, frequency, lost=lost)
+            return found
         growing, swinging = _counted(pencil, pairs, gyroscopic)
         if swinging >= negative:  # they leave none to what grows
             return Stability(negative)
         if growing + swinging >= negative:
-            return Stability(negative, growth, frequency, lost=lost)
+            return found
         if count >= 64 or count >= pencil.K.getSize()[0]:
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
-            return Stability(negative, growth, frequency, complete=False, lost=lost or not gyroscopic)
+            return replace(found, complete=False, lost=found.lost or not gyroscopic)
         count *= 2
 
 

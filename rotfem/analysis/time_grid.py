@@ -4,8 +4,8 @@ Knots are the instants at which a signal or its rate may jump: rows of tables, e
 `time.breakpoints`. In a step with a knot inside, schemes of second order replace every signal by the straight line with
 its mean and its first moment (`rotfem.mechanics.time_signals`), with an error of second order; where all of them are
 near straight lines already, as tables of what steps resolve, by their values. Lines of neighbouring steps with several
-knots each join. Schemes of higher order,
-and adaptive steps, take a step with few knots in intervals from one to the next; with more they use lines as well.
+knots each join. In steps of higher order cubics replace the signals, with the values at the ends of the step as well.
+Such steps end at jumps that are rare or large, if they are few in a step; with more of them straight lines serve too.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from rotfem.mechanics.time_signals import SAME, Fit, TimeSignal, View
 
 Array = npt.NDArray[np.float64]
 
-#: Most knots in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
+#: Most jumps in a step at which intervals end; shortest one, and distance of equal instants, as parts of a step.
 FEW, SHORTEST, CLOSE = 4, 1e-3, 1e-9
 
 #: Distance of a signal from its chord over a step, as a part of its largest value, that a scheme of second order leaves
 #: to itself: that of a wave of 22 steps a period, (ωh)²/8.
 RESOLVED = 1e-2
+
+#: Part of a signal's largest value from which on a step of fourth order ends at a jump, however many there are.
+LARGE = 0.1
 
 #: Steps for each knot from which on straight lines in those with knots, each as dear as four, cost no third of a march.
 RARE = 12
@@ -64,24 +67,30 @@ class Interval:
         return View(-1 if self.at_knot else 0, self.line)
 
 
-def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterator[Interval]:
-    """Yield the intervals of steps between times (s), nominally `step` long (s), `divided` at few knots (s)."""
+def intervals(knots: Array, jumps: Array | None, times: Array, step: float) -> Iterator[Interval]:
+    """Yield the intervals of steps between times (s), nominally `step` long (s), with knots (s) in them.
+
+    Of schemes of fourth order they end at the jumps (s) among the knots, if these are few; others have None.
+    """
     close = CLOSE * step
     before, after = (np.searchsorted(knots, times + side * close) for side in (-1, 1))
     ends, there = [float(t) for t in times], after[1:] > after[:-1]
-    fine = [False, *(before[1:] - after[:-1] > 1) & (not divided), False]  # of the steps, with one more at both ends
+    fine = [False, *(before[1:] - after[:-1] > 1) & (jumps is None), False]  # of the steps, with one more at both ends
     begin, length = ends[0], step
     for i, end in enumerate(ends[1:]):
-        inside: Any = knots[after[i] : before[i + 1]].tolist() if there[i] else []
+        inside: Any = knots[after[i] : before[i + 1]] if there[i] else np.empty(0)
         at_knot = bool(there[i] and before[i + 1] < after[i + 1])
         last = float(knots[before[i + 1]]) if at_knot else end
-        stops = [*inside, last] if divided and len(inside) <= FEW else [last]
+        cuts = [] if jumps is None else inside[np.isin(inside, jumps)].tolist()
+        stops = [*cuts, last] if len(cuts) <= FEW else [last]
         if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORTEST * step:
             stops = [last]
-        line: Fit | None = (begin, last, 1) if len(stops) <= len(inside) else None
-        if fine[i + 1]:
-            line = (ends[i - 1] if fine[i] else begin, begin, last, ends[i + 2] if fine[i + 2] else last)
         for stop in stops:
+            line: Fit | None = None
+            if fine[i + 1]:
+                line = (ends[i - 1] if fine[i] else begin, begin, last, ends[i + 2] if fine[i + 2] else last)
+            elif np.any((inside > begin) & (inside < stop)):
+                line = (begin, stop, 3 if jumps is not None and len(cuts) < len(stops) else 1)
             taken = stop - begin  # of one length to the last digit, so that the matrix stays
             if abs(taken - step) <= close:
                 length = step
@@ -93,32 +102,35 @@ def intervals(knots: Array, times: Array, step: float, divided: bool) -> Iterato
 
 def knots_of(
     signals: Sequence[TimeSignal], times: Any, breakpoints: Sequence[float] = (), divided: bool = True
-) -> Array:
-    """Return the knots (s) of all signals, searched between times (s) where they are not known, and breakpoints.
+) -> tuple[Array, Array | None]:
+    """Return the knots (s) of all signals, and those at which steps of fourth order (`divided`) end; else None.
 
-    Steps of second order (not `divided`, see `intervals`) do without those that they resolve, others without kinks of
-    rates if these are many.
+    Knots are searched between times (s) where they are not known. Steps of second order do without those that they
+    resolve. Others end at breakpoints, and at jumps that are rare or large.
     """
+    knots, jumps = [np.array(breakpoints, dtype=np.float64)], [np.array(breakpoints, dtype=np.float64)]
     for signal in signals:
         find_knots(signal, times, breakpoints)
-    rare = (s.bent if divided and RARE * len(s.bent) < len(times) else () for s in signals)
-    of_signals = *(s.knots if divided else unresolved(s, times) for s in signals), *rare
-    found: Array = np.unique(np.concatenate([np.array(breakpoints, dtype=np.float64), *of_signals]))
-    return found
-
-
-def unresolved(signal: TimeSignal, times: Array) -> Array:
-    """Return the knots (s) of a signal that are rare, or in steps between times (s) in which it jumps or is bent."""
-    knots: Array = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
-    if RARE * len(knots) < len(times):
-        return knots
-    f, (before, after) = signal.values(times), (signal.values(knots * (1 + side * SAME)) for side in (-1, 1))
-    step = np.clip(np.searchsorted(times, knots), 1, len(times) - 1)
-    share = ((knots - times[step - 1]) / (times[step] - times[step - 1]))[:, None]
-    chord, size = (1 - share) * f[step - 1] + share * f[step], max(np.abs(x).max() for x in (f, before, after))
-    jumps = np.linalg.norm(after - before, axis=1) > CLOSE * size
-    off = np.linalg.norm(before - chord, axis=1) > RESOLVED * size
-    return np.asarray(knots[np.isin(step, step[jumps | off])])
+        there = signal.knots[(signal.knots >= times[0]) & (signal.knots <= times[-1])]
+        if divided:
+            knots.append(signal.bent)
+        if not len(there):
+            continue
+        before, after = (signal.values(there * (1 + side * SAME)) for side in (-1, 1))
+        size = max(np.abs(x).max() for x in (before, after))
+        change = np.linalg.norm(after - before, axis=1)
+        jump = change > CLOSE * size
+        jumps.append(there[jump if RARE * jump.sum() < len(times) else change > LARGE * size])
+        if divided or RARE * len(there) < len(times):
+            knots.append(there)
+        else:
+            step = np.clip(np.searchsorted(times, there), 1, len(times) - 1)
+            share = ((there - times[step - 1]) / (times[step] - times[step - 1]))[:, None]
+            f = signal.values(times)
+            chord = (1 - share) * f[step - 1] + share * f[step]
+            off = np.linalg.norm(before - chord, axis=1) > RESOLVED * max(size, np.abs(f).max())
+            knots.append(there[np.isin(step, step[jump | off])])
+    return np.unique(np.concatenate(knots)), np.unique(np.concatenate(jumps)) if divided else None
 
 
 def find_knots(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = ()) -> None:

@@ -97,8 +97,10 @@ class UnbalanceResponse:
         self._at = [PointValues(V, np.array([x, 0.0, 0.0])) for x in self.places]
         self.x = structure.nodes(self._system.zeros())[0]["x"]
 
-    def at(self, speed: float) -> tuple[Complex, Complex, Complex]:
-        """Return u₂, u₃ (m) at the nodes, (2, nodes), and at the places, and forces on supports (N), (2, n).
+    def at(self, speed: float) -> tuple[Complex, Complex, list[dict[str, complex]]]:
+        """Return u₂, u₃ (m) at the nodes, (2, nodes), and at the places, and what supports carry.
+
+        That is `f2`, `f3` (N) of each support, and `m2`, `m3` (N·m) of one with tilting coefficients.
 
         Args:
             speed: Ω, rad/s.
@@ -112,5 +114,8 @@ class UnbalanceResponse:
         nodes = analysis.structure.nodes(u)[1][:, self._across[:2]].T
         there = np.array([point(u)[self._across[:2]] for point in self._at]).T
         forces = analysis.structure.support_forces(frame, speed, u, 1j * speed * u)
-        both = [forces[f"support_{i}_f"] for i in range(len(self.supports))]
-        return nodes, there, np.array(both, dtype=np.complex128).reshape(-1, 2).T
+        carried: list[dict[str, complex]] = [{} for _ in self.supports]
+        for name, (of_2, of_3) in forces.items():
+            _, i, kind = name.split("_")
+            carried[int(i)] |= {f"{kind}2": of_2, f"{kind}3": of_3}
+        return nodes, there, carried

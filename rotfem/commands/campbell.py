@@ -25,7 +25,7 @@ from rotfem.commands.interrupts import together
 from rotfem.commands.mode_tables import advice, doubtful, mode_rows
 from rotfem.commands.modes import analysis_of, answered, hints_of
 from rotfem.commands.problem import Problem
-from rotfem.commands.processes import modal_summary, shared_out
+from rotfem.commands.processes import modal_summary
 from rotfem.commands.recorder import check_rows
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.listeners import Hint, Progress
@@ -45,8 +45,9 @@ Array = npt.NDArray[Any]
 PAIRS = ("values", "right", "left", "errors", "bounds")
 
 
-def parse_speeds(text: str) -> list[float]:
-    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end."""
+def parse_speeds(given: Sequence[float] | str) -> list[float]:
+    """Return speeds (rad/s), also of "first:last:number" or "s1,s2,…", with the unit of all of them at the end."""
+    text = given if isinstance(given, str) else ",".join(repr(float(s)) for s in given)
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
@@ -79,7 +80,7 @@ def campbell_of(
     """Return the modes of a scene followed over speed (see `rotfem.campbell`); marks are keys of the scene."""
     given = {key: list(mark) if isinstance(mark, tuple) else mark for key, mark in marks.items() if mark is not None}
     scene = scene.showing("speed", speeds).replace(given)
-    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
+    values = parse_speeds(speeds)
 
     def compute(variant: Scene, *_: Any) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
@@ -141,10 +142,6 @@ def diagram(
     sweep = Sweep(analysis, count, only, over_range(analysis, values, count + SPARE))
     if sweep.model is None and kept is not None:
         sweep.known = kept.load(analysis)
-    if analysis.everyone.size > analysis.comm.size and sweep.model is None:  # each process has a copy
-        left = [speed for speed in values if speed not in sweep.known]
-        sweep.known |= solved_by_all(analysis, left, count, progress)
-        sweep.solves += len(left)
     stopped: ComputationError | KeyboardInterrupt | None = None
     try:
         sweep.run(values, progress or (lambda share: None))
@@ -280,21 +277,6 @@ class FinishedSpeeds:
         """Remove the file of a diagram that is finished."""
         if MPI.COMM_WORLD.rank == 0:
             self._path.unlink(missing_ok=True)
-
-
-def solved_by_all(
-    analysis: ModalAnalysis, values: Sequence[float], count: int, progress: Progress | None
-) -> dict[float, Spinning]:
-    """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
-    before, ranks = list[Spinning](), analysis.everyone.size
-
-    def solve(speed: float) -> tuple[Any, ...]:
-        before.append(found := analysis.at(speed, count + SPARE, before[-1] if before else None))
-        if progress is not None:
-            progress(min(1.0, len(before) * ranks / len(values)))
-        return speed, found.q, found.pairs, found.rigid, found.reference  # which another process can have
-
-    return {found[0]: analysis.restored(*found) for found in shared_out(values, solve, analysis.everyone)}
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]]) -> list[str]:

@@ -19,7 +19,6 @@ from mpi4py import MPI
 from rotfem import registry
 from rotfem.accuracy.answer import Answer, Answers, Setting, distance
 from rotfem.accuracy.ladder import MOST_FAILURES, Clock, OverBudget, ladder, reduced
-from rotfem.accuracy.tuned import write_variant
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.answers import in_own_setting
 from rotfem.commands.explain import Output
@@ -443,7 +442,7 @@ class CostResult(Rows):
             f"# {self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}:\n"
             f"# {row['words']}.\n# Measured: {measured(row)} with set-up.\n\n"
         )
-        return write_variant(self.scene, changes_of(self.scene, row), Path(path), remark)
+        return self.scene.replace(changes_of(self.scene, row)).write(path, remark)
 
     def tables(self) -> list[ShortTable]:
         """Return one row a setting, cheapest first; of many settings those of the Pareto front."""

@@ -32,7 +32,7 @@ from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
-from rotfem.errors import ComputationError, InputError, input_of
+from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory, theories
@@ -66,15 +66,6 @@ ACCURACY, SHARE = 1e-2, 0.25
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
-
-
-def explained(
-    scene: Scene, comm: MPI.Comm, progress: Progress | None = None, terms: Mapping[str, Work] | None = None
-) -> ExplainResult:
-    """Return how much every effect and theory changes the outputs of a scene (see `rotfem.explain`)."""
-    with input_of(scene.file):
-        of = Explanation(scene, terms or {}, comm)
-        return of.result(progress or (lambda share: None))
 
 
 def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:
@@ -190,10 +181,18 @@ class Explanation:
         self.given, self.terms, self.comm = scene, terms, comm
         frame = "rotating" if scene.model.frame == "inertial" else scene.model.frame
         self.scene = scene = in_own_setting(scene).replace({"output.error": False, "model.frame": frame})
-        self.problem = problem = Problem.of(scene, terms=terms).replace(outputs={})
+        problem = Problem.of(scene, terms=terms).replace(outputs={})
         self.inner, self.effects = communicator(problem, comm), problem.replace(effects=None).effective_effects()
-        self._systems: dict[tuple[str, str], Any] = {}
-        self.system = self._switched(problem)
+        self._systems, self._unable = dict[tuple[str, str], Any](), dict[str, dict[str, InputError]]()
+        while not hasattr(self, "system"):
+            try:
+                self.system = self._switched(problem)
+            except InputError as error:
+                if isinstance(scene.model.effects, tuple) or error.key != "model.effects":
+                    raise
+                able = tuple(name for name in problem.effective_effects() if name != error.value)
+                problem = problem.replace(effects=able)  # "auto" takes what the theory can have
+        self.problem = problem
         degree = self.system.V.element.basix_element.degree  # a default differs by cell
         self.own = replace(Setting.of(scene), degree=degree, effects=problem.effective_effects())
         self.absent, hub = self._absent(), problem.motion.hub
@@ -230,12 +229,22 @@ class Explanation:
     def _switched(self, problem: Problem) -> Any:
         """Return the system of a problem; those of one theory and mesh are one, with effects switched by constants."""
         whole = problem.replace(effects=None)
-        key = problem.theory.name, repr(problem.mesh)
-        if key not in self._systems:
-            system = self._systems[key] = compile_system(whole, self.inner, self.scene.time is not None, parted=True)
-            if system.linear:
+        key, wanted = (problem.theory.name, repr(problem.mesh)), set(problem.effective_effects())
+        unable = self._unable.setdefault(problem.theory.name, {})
+        while key not in self._systems or wanted & set(unable):
+            for name in wanted & set(unable):
+                raise unable[name]
+            able = tuple(name for name in whole.effective_effects() if name not in unable)
+            system = compile_system(whole.replace(effects=able), self.inner, self.scene.time is not None, parted=True)
+            try:
                 system.check_terms()
-        self._systems[key].leave_out(set(whole.effective_effects()) - set(problem.effective_effects()))
+            except InputError as error:
+                if error.key != "model.effects":
+                    raise
+                unable[error.value] = error  # of a linear theory, in which the others are seen without it
+            else:
+                self._systems[key] = system
+        self._systems[key].leave_out(set(whole.effective_effects()) - set(unable) - wanted)
         return self._systems[key]
 
     def _of(self, variant: Scene) -> tuple[Problem, Any, Newton]:

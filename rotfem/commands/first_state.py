@@ -95,7 +95,7 @@ def _equilibrium(scene: Scene, problem: Problem, system: System, judged: bool) -
     end = 0.0 if scene.time is None else scene.time.end
     if said and 0.0 < growth * end < 1.0:
         said = f"{said}; by a factor of {math.exp(growth * end):.4g} in the {end:g} s of the history"
-    elif start.stability.stable is False:
+    elif start.stability.stable is False or growth > 0.0:
         raise ComputationError(f"the history would start from an {said}", advice=WITHOUT)
     if said:
         start.warnings.append(f"what the history starts from: {said}")

@@ -46,7 +46,8 @@ def mode_tables(found: Spinning, count: int, formats: tuple[str, ...] | None = N
 
 def remarks(spinning: Spinning, rows: list[dict[str, Any]]) -> tuple[Stability, list[str]]:
     """Return the stability of the equilibrium, and warnings of it, of the model, and of modes that grow."""
-    analysis, found = spinning.analysis, stability_of_pencil(spinning.pencil, spinning.clamped)
+    analysis = spinning.analysis
+    found = stability_of_pencil(analysis.structure, spinning.pencil, spinning.clamped)
     out = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(rows)]
     out += critical(rows, spinning.speed, analysis.fixed)
     # An instability that grows by more than those of the modes that are asked for is none of them.

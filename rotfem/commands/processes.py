@@ -1,8 +1,8 @@
 """How several processes share one command, and what all summaries have in common.
 
 A large system shares its mesh, of a small one each process has a copy. With a copy on every process nothing is
-communicated within a solution, and all have the whole result. What there is many of, speeds or frequencies, is then
-shared out; a history or one set of modes is computed by each.
+communicated within a solution, and all have the whole result. The frequencies of a response are then shared out; all
+else is computed by each.
 """
 
 from __future__ import annotations
@@ -72,12 +72,12 @@ def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.C
 def summary(command: str, scene: Scene, comm: MPI.Comm, inner: MPI.Comm | None = None) -> dict[str, Any]:
     """Return what every summary has; `inner` are the processes that the system is discretised on, all if None.
 
-    On several processes `shared` is "mesh", "speeds", "frequencies" or "nothing".
+    On several processes `shared` is "mesh", "frequencies" or "nothing".
     """
     out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name, "versions": versions()}
     out["ranks"] = comm.size
     if comm.size > 1:
-        copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
+        copies = "frequencies" if command == "response" else "nothing"
         out["shared"] = "mesh" if (inner or comm).size > 1 else copies
     return {**out, "scene": scene.digest()}
 

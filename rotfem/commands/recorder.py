@@ -110,9 +110,7 @@ class Monitor:
         """Take note of a state that is recorded."""
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
-        elif (size := float(np.max(self.system.sizes(state.q), initial=0.0))) > 1.02 * self.farthest[
-            0
-        ]:  # some are copied
+        elif (size := self.system.size(state.q)) > 1.02 * self.farthest[0]:  # some are copied
             self.farthest = (size, state.t, np.array(state.q))
 
     def round_off(self) -> str:

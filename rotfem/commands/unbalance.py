@@ -75,7 +75,7 @@ def whirl(
 def rows_of(
     response: UnbalanceResponse,
     speed: float,
-    answer: tuple[Array, Array, Array],
+    answer: tuple[Array, Array, list[dict[str, complex]]],
     probes: Sequence[tuple[float, float]],
 ) -> list[dict[str, Any]]:
     """Return one row a place at a speed (see `rotfem.UnbalanceResult`)."""
@@ -88,7 +88,7 @@ def rows_of(
             row |= {name: float(abs(value)), f"{name}_phase": float(np.angle(value))}
         row |= {name: float(getattr(orbit, name)) for name in ("major", "minor", "angle")}
         for i in (i for i, support in enumerate(response.supports) if support == x):
-            for name, value in zip(("f2", "f3"), forces[:, i], strict=True):
+            for name, value in forces[i].items():
                 row |= {name: float(abs(value)), f"{name}_phase": float(np.angle(value))}
         for angle in (angle for place, angle in probes if place == x):
             reading = orbit.along(angle)
@@ -100,7 +100,7 @@ def rows_of(
 def peaks_of(
     response: UnbalanceResponse,
     speeds: Sequence[float],
-    answers: Sequence[tuple[Array, Array, Array]],
+    answers: Sequence[tuple[Array, Array, list[dict[str, complex]]]],
     operating: Sequence[float] | None,
 ) -> list[dict[str, Any]]:
     """Return the peaks of the larger semi-axis at every place, between the speeds."""

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
@@ -41,7 +40,7 @@ class BySpin:
 
     def __init__(self, model: Model, form: Any):
         self.constants = [model.structure.constant(0.0) for _ in range(3)]
-        self._model, self._form = model, form
+        self._model, self._form, self._entries = model, form, [c.value for c in self.constants]
 
     @cached_property
     def ufl(self) -> Any:
@@ -63,8 +62,7 @@ class BySpin:
 
     def set(self, c_v: float, c_m: float) -> None:
         """Set the factors."""
-        for constant, value in zip(self.constants, (c_v, c_m), strict=False):
-            constant.value = value
+        self._entries[0][()], self._entries[1][()] = c_v, c_m
 
 
 class HubRow:
@@ -86,7 +84,8 @@ class HubRow:
         self.model, self.angle, self.hub, self._clamped = model, model.hub, model.hub.hub, clamped
         self.coupled = "hub_coupling" in model.effects
         moments = model.work(model.turn)
-        moment, self._shifts = added(moments.values()), [model.structure.constant(0.0) for _ in range(3)]
+        moment, shifts = added(moments.values()), [model.structure.constant(0.0) for _ in range(3)]
+        self._shift_entries = [c.value for c in shifts]
         self._by_spin = BySpin(model, moment)
         *state, dq = model.structure.k.functions
         self._state = [x.x.array for x in state]
@@ -96,12 +95,12 @@ class HubRow:
             wanted = {
                 "moment": moment,
                 "spin": self._by_spin.ufl,
-                "row": weighted(self._shifts, (ufl.derivative(moment, x, dq) for x in state)) if self.coupled else None,
+                "row": weighted(shifts, (ufl.derivative(moment, x, dq) for x in state)) if self.coupled else None,
                 "outside": added(outside) if outside else None,
             }
             return {name: form for name, form in wanted.items() if form is not None}
 
-        purpose, more = f"hub {model.motion.axis} {model.effects}", (*self._shifts, *self._by_spin.constants)
+        purpose, more = f"hub {model.motion.axis} {model.effects}", (*shifts, *self._by_spin.constants)
         self._forms = model.derived_forms(purpose, make, more, once=False)[1]
         self.has_outside, self._momentum = "outside" in self._forms, None
         self._vector = compat.create_vector(model.structure.V)
@@ -128,7 +127,7 @@ class HubRow:
         kept = None if self.coupled else [x.copy() for x in self._state]
         if kept is not None:
             self._write([0.0] * 3)
-        value = float(summed(self.model.comm, fem.assemble_scalar(form)))
+        value = float(summed(self.model.comm, forms.functional(form)))
         if kept is not None:
             self._write(kept)
         return value
@@ -175,8 +174,8 @@ class HubRow:
         if not self.coupled:
             self._vector.zeroEntries()
             return self._vector
-        for constant, value in zip(self._shifts, shifts, strict=True):
-            constant.value = value
+        for entry, value in zip(self._shift_entries, shifts, strict=True):
+            entry[()] = value
         out = assembled(self._forms["row"], self.model.structure.V, self._clamped, self._vector)
         if self._unbalances:
             out.array[:] += shifts[2] * self._reaction()[1]

@@ -28,7 +28,7 @@ from rotfem.numerics import forms
 from rotfem.numerics.forms import added
 from rotfem.registry import resolved, structures
 from rotfem.structures.structure import Array, Structure
-from rotfem.users_functions import called
+from rotfem.users_functions import called, of_unknowns
 
 #: Name ↦ constants of each integral of a form, and name ↦ compiled form.
 Both = tuple[dict[str, Any], dict[str, Any]]
@@ -120,7 +120,8 @@ class Model:
             replace(b, density=self._switched(b.effect or "structure", bool(b.effect), b.density))
             for b in s.bodies(self.effects)
         ]
-        strains = self.strains(theory.measures(s.type), first_order=theory.linear)
+        with of_unknowns(s.components):
+            strains = self.strains(theory.measures(s.type), first_order=theory.linear)
         self.mechanics = Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
         self.terms = self.work(Variation(self.structure.k))
         self.residual = added(self.terms.values())
@@ -189,7 +190,8 @@ class Model:
         """Return name ↦ virtual work of every effect for a variation, each times its switch; UFL forms."""
         out = {}
         for name, effect in self.acting.items():
-            with called(f"terms.{name}", "the function") if name in self.problem.terms else nullcontext():
+            own = called(f"terms.{name}", "the function") if name in self.problem.terms else nullcontext()
+            with own, of_unknowns(self.structure.components):
                 term = effect.term(self.mechanics, variation)
             if not isinstance(term, int):
                 out[name] = self._switched(name, name in self.effects, term)

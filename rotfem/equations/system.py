@@ -16,7 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem, la
+from dolfinx import la
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -428,22 +428,6 @@ class System(ABC):
 
     increment_size = size  # of a correction by which Newton is judged; a hub's angle is among the unknowns then
 
-    def sizes(self, x: Array) -> Array:
-        """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
-        here = np.abs(x[: len(self.scale)]) / self.scale
-        here = self.structure.whole_values(here.reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0))
-        if self.comm.size > 1:
-            self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
-        return np.asarray(here)
-
-    def displaced(self, x: Array) -> Array:
-        """Return the largest displacement by each component (m), by a rotation that of a section's points at `radius`.
-
-        Shape (components,), over all ranks; see `rotfem.structures.structure.Structure`.
-        """
-        s = self.structure
-        return np.asarray(self.sizes(x) * np.where(s.moves, s.length, s.radius))
-
     def tip(self, q: Array, t: float) -> Array:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
         tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))
@@ -514,7 +498,7 @@ class System(ABC):
 
     def total(self, form: Any) -> float:
         """Return the value of a compiled functional over all ranks; 0 of None."""
-        return 0.0 if form is None else float(summed(self.comm, fem.assemble_scalar(form)))
+        return 0.0 if form is None else float(summed(self.comm, forms.functional(form)))
 
     def outputs(self) -> dict[str, float]:
         """Return the functionals of the problem at the state and time set."""

@@ -55,7 +55,7 @@ class Torque:
             change[last] -= torque
         return np.repeat(t, 2), np.repeat(np.concatenate([[0.0], np.cumsum(change)]), 2)[1:-1]
 
-    @property
+    @cached_property
     def knots(self) -> Array:
         """Times (s) between which it is linear."""
         return np.unique(self._line[0])

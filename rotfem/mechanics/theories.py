@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Any, ClassVar
 
+from rotfem.errors import InputError
 from rotfem.registry import Registry, register, resolved
 from rotfem.registry import theories as registered
+
+#: Structure type ↦ number of its strain measures.
+MEASURES = {"planar_beam": 3, "spatial_beam": 2, "plate": 3}
 
 #: What the strains of a structure type are computed by: a function, or "module:name".
 Strains = str | Callable[..., tuple[Any, ...]]
@@ -50,11 +55,25 @@ class Theory:
 
     def measures(self, structure: str) -> Callable[..., tuple[Any, ...]]:
         """Return the strain measures of a structure type."""
-        return resolved(self.strains[structure])
+        return self._counted(self.strains[structure], structure)
 
     def prestress_measures(self, structure: str) -> Callable[..., tuple[Any, ...]]:
         """Return the second-order strains that the forces of the linear structure work on."""
-        return resolved(self.prestress[structure])
+        return self._counted(self.prestress[structure], structure)
+
+    def _counted(self, strains: Strains, structure: str) -> Callable[..., tuple[Any, ...]]:
+        """Return a function of strains that refuses another number of them."""
+        function, needed = resolved(strains), MEASURES.get(structure)
+
+        @wraps(function)
+        def counted(*arguments: Any) -> tuple[Any, ...]:
+            found: tuple[Any, ...] = function(*arguments)
+            if needed not in (None, len(found)):
+                why = f"returns {len(found)} strains, a {structure.replace('_', ' ')} needs {needed}"
+                raise InputError("model.theory", self.name, why)
+            return found
+
+        return counted
 
 
 def theories() -> tuple[Theory, ...]:

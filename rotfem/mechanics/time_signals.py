@@ -1,15 +1,15 @@
 """Signals: prescribed data over time, evaluated on one side of an instant, or as a straight line over a step.
 
 Speed, base acceleration, torque and loads are signals, smooth between their knots. At a knot a signal has two values:
-that of the step that ends, t⁻, and that of the step that starts, t⁺. If knots are closer than steps, a signal f is
-replaced over a step [a, b] by the polynomial with its first moments,
+that of the step that ends, t⁻, and that of the step that starts, t⁺. Over a step [a, b] with knots inside a signal f is
+replaced by the straight line with its mean and first moment, as schemes of second order need, or for others by the
+cubic that has the values of f at both ends too, so that cubics of neighbouring steps join:
 
-    f̄(t) = Σ_k (2k + 1)/h P_k(x(t)) ∫ P_k(x(s)) f(s) ds,    x(t) = (2t − a − b)/h,    h = b − a,    k = 0 … n,
+    f̄ = Σ_k c_k P_k(x),    x(t) = (2t − a − b)/h,    h = b − a,    c_k = (2k + 1)/h ∫ P_k(x(s)) f(s) ds,    k = 0, 1,
 
-P_k those of Legendre: its best approximation in the sense of least squares, with the impulse of f. A straight line
-(n = 1) serves schemes of second order, a cubic others. In a row of steps with several knots each the lines of second
-order join: their value where two of them meet is the mean of f over both, weighted by the hat function of the instant.
-So the sums of the scheme have its impulse and first moment, and noise of the input does not add up in them.
+P_k those of Legendre. In a row of steps with several knots each the lines of second order join as well: their value
+where two of them meet is the mean of f over both, weighted by the hat function of the instant. So the sums of the
+scheme have its impulse and first moment, and noise of the input does not add up in them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.polynomial.legendre import leggauss, legvander
-from numpy.polynomial.polynomial import polyval
+from numpy.polynomial.legendre import leggauss
 
 from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import Torque
@@ -36,16 +35,21 @@ Array = npt.NDArray[np.float64]
 #: Relative distance of two times below which they are equal.
 SAME = 1e-13
 
-#: Begin and end (s) of a step, and the degree of the polynomials that replace signals in it; or its begin and end after
-#: the begin and before the end of its neighbours, with which lines join (its own where they do not).
+#: Begin and end (s) of a step, and the degree of the polynomials that replace signals in it, 1 or 3; or its begin and
+#: end after the begin and before the end of its neighbours, with which lines join (its own where they do not).
 Fit = tuple[float, float, int] | tuple[float, float, float, float]
 
-#: Gauss points and weights on (0, 1): exact for polynomials of degree 7, as a cubic times one.
+#: Gauss points and weights on (0, 1): exact for polynomials of degree 7.
 POINTS, WEIGHTS = (x / 2 for x in leggauss(4))
 POINTS = POINTS + 0.5
 
-#: Column k: coefficients of the powers of x in (2k + 1) P_k, up to cubics.
-LEGENDRE = np.array([[1.0, 0.0, -2.5, 0.0], [0.0, 3.0, 0.0, -10.5], [0.0, 0.0, 7.5, 0.0], [0.0, 0.0, 0.0, 17.5]])
+#: Column k: coefficients of the powers of x in P_k, up to cubics.
+LEGENDRE = np.array([[1.0, 0.0, -0.5, 0.0], [0.0, 1.0, 0.0, -1.5], [0.0, 0.0, 1.5, 0.0], [0.0, 0.0, 0.0, 2.5]])
+
+
+def has_ends(line: Fit | None) -> bool:
+    """Return whether what replaces signals in a step, if anything, has their values at its ends."""
+    return line is None or line[2:] == (3,)
 
 
 @dataclass
@@ -122,7 +126,8 @@ class TimeSignal:
         """Return f̄ of a step (see `Fit`) at times (n,), shape (n, components); at one, shape (components,)."""
         begin, end = line[-3:-1] if len(line) == 4 else line[:2]
         x = (t - 0.5 * (begin + end)) * (2 / (end - begin))
-        return np.asarray(polyval(x, self._powers(line)), dtype=np.float64).T
+        powers = self._powers(line)
+        return np.asarray(np.power.outer(x, np.arange(len(powers))) @ powers)
 
     def _powers(self, line: Any) -> Array:
         """Return the coefficients of powers of x in f̄ of a step, shape (degree + 1, components)."""
@@ -131,19 +136,23 @@ class TimeSignal:
                 first, last = self._joint(*line[:3]), self._joint(*line[1:])
                 powers = np.array([first + last, last - first]) / 2
             else:
-                powers = LEGENDRE[: line[2] + 1, : line[2] + 1] @ self._moments(*line)
+                powers = self._line(*line[:2])
+            if line[2:] == (3,):
+                after, before = self.values(np.array([line[0] + SAME * (abs(line[0]) or SAME), line[1] * (1 - SAME)]))
+                mean, slope = powers
+                powers = LEGENDRE @ np.array([mean, slope, (after + before) / 2 - mean, (before - after) / 2 - slope])
             self._fit = line, powers
         return self._fit[1]
 
     def _joint(self, before: float, at: float, after: float) -> Array:
         """Return the mean of f weighted by the hat function of an instant (s) between two others."""
         sides = ((before, at, 1.0), (at, after, -1.0))
-        total = sum((b - a) * (np.array([1.0, sign]) @ self._moments(a, b, 1)) for a, b, sign in sides if b > a)
+        total = sum((b - a) * (np.array([1.0, sign / 3]) @ self._line(a, b)) for a, b, sign in sides if b > a)
         return np.asarray(total / (after - before))
 
-    def _moments(self, begin: float, end: float, degree: int) -> Array:
-        """Return ∫ P_k(x(s)) f(s) ds / h of a step, shape (degree + 1, components)."""
-        if (found := self._kept.get((begin, end, degree))) is not None:
+    def _line(self, begin: float, end: float) -> Array:
+        """Return c_0 and c_1 of a step: mean and slope of the best line in it, shape (2, components)."""
+        if (found := self._kept.get((begin, end))) is not None:
             return found
         middle, h = 0.5 * (begin + end), end - begin
         first, last = np.searchsorted(self._points, (begin, end), side="right")
@@ -151,11 +160,10 @@ class TimeSignal:
         edges = np.array([begin, *inside[inside < end], end])
         s = (edges[:-1, None] + np.diff(edges)[:, None] * POINTS).ravel()
         weights = (np.diff(edges)[:, None] * WEIGHTS).ravel() / h
-        moments = legvander((s - middle) * (2 / h), degree).T @ (weights[:, None] * self.values(s))
+        basis = np.array([weights, 3 * weights * (s - middle) * (2 / h)])
         if len(self._kept) > 4:
             self._kept.clear()
-        self._kept[begin, end, degree] = moments
-        return np.asarray(moments)
+        return self._kept.setdefault((begin, end), basis @ self.values(s))
 
     def deviation(self, t: Array, *line: Any) -> Array:
         """Return |f − f̄| at times (n,) of a step, as parts of the largest |f| there."""

@@ -155,11 +155,19 @@ def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> A
     """Return a linear form as a PETSc vector (b if given, overwritten), zero at clamped unknowns."""
     b = compat.create_vector(V) if b is None else b
     with b.localForm() as local:
-        local.set(0.0)
-    fem_petsc.assemble_vector(b, form)
-    b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+        values = local.array
+        values.fill(0.0)
+        add_vector(values, form)
+    if b.comm.size > 1:
+        b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
     b.array[clamped] = 0.0
     return b
+
+
+def functional(form: Any) -> float:
+    """Return this process's part of a compiled functional."""
+    code = form._cpp_object
+    return float(cpp.fem.assemble_scalar(code, cpp.fem.pack_constants(code), cpp.fem.pack_coefficients(code)))
 
 
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or

@@ -53,8 +53,9 @@ class Newton:
     """Newton iteration that is judged by its increments.
 
     A residual tolerance would lie below round-off where axial and bending stiffness differ by ten orders; the size of
-    the increment, in the units of the unknowns, does not. Once the quadratic constant kappa = |d_1|/|d_0|^2 is known
-    from an earlier solve, an iteration whose predicted successor is below tolerance is the last.
+    the increment, in the units of the unknowns, does not. Once the quadratic constants kappa = |d_2|/|d_1|² and
+    |d_3|/|d_2|² are known from earlier solves, a first iteration whose predicted successor is below tolerance is the
+    last, and a second one whose successor is below a ten-thousandth of it, as errors of q are c_a times as large in a.
 
     Attributes:
         tolerance: largest accepted increment, relative to the scale of each unknown.
@@ -72,8 +73,8 @@ class Newton:
     diverging: bool = False
     wandered: bool = False
     roundoff: float = 0.0
-    _kappa: float = field(default=np.inf, repr=False)
-    _longest: float = field(default=0.0, repr=False)
+    _kappa: list[float] = field(default_factory=lambda: [np.inf, np.inf], repr=False)
+    _longest: list[float] = field(default_factory=lambda: [0.0, 0.0], repr=False)
 
     @classmethod
     def of(cls, settings: Any) -> Newton:
@@ -101,9 +102,10 @@ class Newton:
                 return k
             if k == 1:
                 first = d
-            if k == 2 and 0 < first <= REACH and factor is None:
-                self._kappa = max(0.5 * self._kappa if math.isfinite(self._kappa) else 0.0, d / first**2)
-                self._longest = max(first, 0.5 * self._longest)
+            if factor is None and 1 < k < 4 and 0 < previous <= REACH:
+                i = k - 2
+                self._kappa[i] = max(0.5 * self._kappa[i] if math.isfinite(self._kappa[i]) else 0.0, d / previous**2)
+                self._longest[i] = max(previous, 0.5 * self._longest[i])
             if factor is not None:
                 # Newton's last increment leaves an error of its square; those with an old factor leave a part of
                 # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
@@ -111,7 +113,7 @@ class Newton:
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 factor.judge(d, enough)
-            elif d <= self.tolerance or (k == 1 and self._successor(d) <= self.tolerance):
+            elif d <= self.tolerance or (k < 3 and self._is_last(k - 1, d)):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and new else 0
             if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
@@ -127,10 +129,10 @@ class Newton:
             f"wanted {self.tolerance:.0e}"
         )
 
-    def _successor(self, d: float) -> float:
-        """Return the most that the next increment after one of size d may be: anything, after a long one.
+    def _is_last(self, i: int, d: float) -> bool:
+        """Return whether the successor of increment i, 0 or 1, of size d is predicted to be small enough.
 
         Of increments twice as long as any that kappa was found with it says nothing, as along an axis on which the
         equations are linear.
         """
-        return 4 * self._kappa * d**2 if d <= 2.0 * self._longest else np.inf
+        return d <= 2.0 * self._longest[i] and 4 * self._kappa[i] * d**2 <= (self.tolerance, 1e-4 * self.tolerance)[i]

@@ -92,14 +92,14 @@ def new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
     return W
 
 
-def spanned(comm: MPI.Comm, columns: Array) -> Array:
-    """Return an orthonormal basis of what columns (n, m) span, but for parts of 1e-10 of a column."""
+def spanned(comm: MPI.Comm, columns: Array, least: float = 1e-10) -> Array:
+    """Return an orthonormal basis of what columns (n, m) span, but for parts of `least` of a column."""
     size = np.sqrt(summed(comm, np.einsum("ij,ij->j", columns, columns)))
     Q, R = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])
     parts = comm.allgather(R)
     U, sizes, _ = np.linalg.svd(np.vstack(parts), full_matrices=False)
     first = sum(len(part) for part in parts[: comm.rank])
-    return np.asarray(Q @ U[first : first + len(R), sizes > 1e-10 * sizes[0]])
+    return np.asarray(Q @ U[first : first + len(R), sizes > least * sizes[0]])
 
 
 # --- few columns ------------------------------------------------------------------------------------------------------

@@ -187,108 +187,81 @@ def _real_span(v: Array) -> Array:
     return np.asarray(np.linalg.svd(np.hstack([v.real, v.imag]), full_matrices=False)[0][:, : v.shape[1]])
 
 
-class RitzPairs:
-    """Ritz pairs of M, C and K (balanced matrices) in a growing real basis.
+def smoothest(
+    pairs: tuple[Array, Array, Array], matrices: tuple[Array, Array, Array], count: int, norm: float
+) -> tuple[Array, Array, Array]:
+    """Return those (λ, x, y) of all of a small pencil that have the smoothest shapes, slowest without damping first.
 
-    Args:
-        matrices: M, C, K.
-        start: first directions, columns of owned unknowns.
-        target: where K + σ C + σ² M is factorised, 0, or away from the zero eigenvalue of a free hub.
-
-    Attributes:
-        values, right, left, errors: λ, vectors of owned unknowns, and the larger backward error of both.
+    Of each conjugate pair there is one. The entries of K are rounded to a part of the norm.
     """
-
-    def __init__(self, matrices: Matrices, start: Array, target: float):
-        self.matrices, self.target = matrices, target
-        self.comm: MPI.Comm = matrices[2].comm.tompi4py()
-        self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
-        self._solver = self._solver_at(target)
-        self.V = np.zeros((matrices[2].getLocalSize()[0], 0))
-        self._products = [self.V] * 3
-        self.add(start)
-
-    def _solver_at(self, sigma: float) -> DirectSolver:
-        """Return a solver of K + σ C + σ² M, of C its sparse part: near enough to find new directions."""
-        P = self.matrices[2].copy()
-        for A, factor in ((self.matrices[1], sigma), (self.matrices[0], sigma**2)):
-            if factor != 0.0:
-                P.axpy(factor, sparse_part(A))
-        return DirectSolver(P)
-
-    def add(self, columns: Array) -> int:
-        """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
-        W = new_directions(self.comm, self.V, columns)
-        self.V = np.hstack([self.V, W])
-        old = self._products
-        self._products = [np.hstack([P, times(A, W)]) for P, A in zip(old, self.matrices, strict=True)]
-        return int(W.shape[1])
-
-    def solve(self, count: int) -> None:
-        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair."""
-        m, c, k = (summed(self.comm, self.V.T @ P) for P in self._products)
-        values, x, y = quadratic(m, c, k, self.target)
-        turn_equal(values, (x, y), (m, c, k))
-        # The square of a larger eigenvalue, times anything, may be no number any more.
-        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
-        zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * self.norms[2]
-        pairs = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ, or ±iλ
-        falling = (values.imag == 0.0) & (values.real < 0.0)
-        upper &= ~(falling & np.any(pairs & zero[:, None] & zero, axis=0))
-        if not np.any(upper):
-            raise ComputationError("damping is so far out of proportion that no mode is left")
-        values, x, y = values[upper], x[:, upper], y[:, upper]
-        order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
-        self.values, x, y = values[order], x[:, order], y[:, order]
-        MX, CX, KX = (P @ x for P in self._products)
-        self.right, self.left = self.V @ x, self.V @ y
-        size = self.norms @ np.abs(np.array([self.values**2, self.values, np.ones_like(self.values)]))
-        self._residual = (self.values**2 * MX + self.values * CX + KX) / size
-        self._left_residual = self._transposed(self.left) / size
-        both = [
-            np.sqrt(summed(self.comm, np.sum(np.abs(r) ** 2, axis=0))) for r in (self._residual, self._left_residual)
-        ]
-        self.errors = np.maximum(*both)
-
-    def _transposed(self, Y: Array) -> Array:
-        """Return (λ² M + λ C + K)^H y for all pairs."""
-        both, m, total = np.hstack([Y.real, Y.imag]), Y.shape[1], np.zeros(Y.shape, dtype=np.complex128)
-        for A, power in zip(self.matrices, (2, 1, 0), strict=True):
-            parts = times_transposed(A, both)
-            total += self.values.conj() ** power * (parts[:, :m] + 1j * parts[:, m:])
-        return total
-
-    def grow(self, own: bool) -> int:
-        """Add directions for pairs that are not done; return how many are new.
-
-        They are K⁻¹ times the residuals: residual inverse iteration (Neumaier 1985), quick where λ is near the target.
-        A real λ of an overdamped pair may be far from it: its own are P(λ)⁻¹ P'(λ) x, Newton's method for P(λ) x = 0.
-        """
-        M, C, _ = self.matrices
-        columns = []
-        for i in np.flatnonzero(self.errors > DONE):
-            lam, solver = self.values[i], self._solver
-            sides = [self._residual[:, i], self._left_residual[:, i]]
-            if own and lam.imag == 0.0 and np.isfinite(lam.real):
-                solver = self._solver_at(float(lam.real))
-                vectors = np.stack([self.right[:, i].real, self.left[:, i].real], axis=1)
-                sides = list((2 * lam.real * times(M, vectors) + times(C, vectors)).T)
-            columns += [*solver.solve_all(np.array([part for r in sides for part in (r.real, r.imag)]).T).T]
-        # by largest entries, whose squares may be no numbers any more; lengths are made one by `add`
-        sizes = summed(self.comm, np.array([np.abs(c).max(initial=0.0) for c in columns]))
-        new = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
-        return self.add(np.array(new).T) if new else 0
+    (values, x, y), (m, c, k) = pairs, matrices
+    turn_equal(values, (x, y), (m, c, k))
+    # The square of a larger eigenvalue, times anything, may be no number any more.
+    upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
+    zero = np.abs(np.sum(x.conj() * (k @ x), axis=0)) < len(k) * ROUNDED * norm
+    both = np.abs(values[:, None] + values) < 0.1 * np.abs(values)  # of a double zero, round-off makes ±λ, or ±iλ
+    falling = (values.imag == 0.0) & (values.real < 0.0)
+    upper &= ~(falling & np.any(both & zero[:, None] & zero, axis=0))
+    if not np.any(upper):
+        raise ComputationError("damping is so far out of proportion that no mode is left")
+    values, x, y = values[upper], x[:, upper], y[:, upper]
+    order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
+    return values[order], x[:, order], y[:, order]
 
 
 def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float) -> tuple[Array, Array, Array, Array]:
-    """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping."""
-    start = np.hstack([undamped.real, undamped.imag])
-    ritz = RitzPairs(matrices, start, target)
-    for number in range(12):
-        ritz.solve(count)
-        done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > 400
-        if done or ritz.grow(own=number >= 6) == 0:
+    """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
+
+    Directions are K⁻¹ times the residuals: residual inverse iteration (Neumaier 1985), quick where λ is near a target.
+    A real λ of an overdamped pair may be far from it: its own are P(λ)⁻¹ P'(λ) x, Newton's method for P(λ) x = 0.
+
+    Args:
+        matrices: M, C, K, balanced.
+        undamped: first directions, complex columns of owned unknowns.
+        count: number of pairs.
+        target: where K + σ C + σ² M is factorised, 0, or away from the zero eigenvalue of a free hub.
+    """
+    (M, C, K), comm = matrices, matrices[2].comm.tompi4py()
+    norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in matrices])
+
+    def solver_at(sigma: float) -> DirectSolver:
+        P = K.copy()
+        for A, factor in ((C, sigma), (M, sigma**2)):
+            if factor != 0.0:
+                P.axpy(factor, sparse_part(A))  # near enough to find new directions
+        return DirectSolver(P)
+
+    def adjoint(A: Any, Y: Array) -> Array:
+        both, n = times_transposed(A, np.hstack([Y.real, Y.imag])), Y.shape[1]
+        return np.asarray(both[:, :n] + 1j * both[:, n:])
+
+    solver, V = solver_at(target), np.zeros((K.getLocalSize()[0], 0))
+    products, new = [V] * 3, np.hstack([undamped.real, undamped.imag])
+    for number in range(13):
+        W = new_directions(comm, V, new)
+        if W.shape[1] == 0:
             break
-    else:
-        ritz.solve(count)
-    return ritz.values, ritz.right, ritz.left, ritz.errors
+        V, products = np.hstack([V, W]), [np.hstack([P, times(A, W)]) for P, A in zip(products, matrices, strict=True)]
+        m, c, k = (summed(comm, V.T @ P) for P in products)
+        values, x, y = smoothest(quadratic(m, c, k, target), (m, c, k), count, norms[2])
+        right, left, powers = V @ x, V @ y, np.array([values**2, values, np.ones_like(values)])
+        sides = sum(p * (P @ x) for p, P in zip(powers, products, strict=True))
+        others = sum(p.conj() * adjoint(A, left) for p, A in zip(powers, matrices, strict=True))
+        residuals = [r / (norms @ np.abs(powers)) for r in (sides, others)]
+        errors = np.maximum(*(np.sqrt(summed(comm, np.sum(np.abs(r) ** 2, axis=0))) for r in residuals))
+        if float(np.max(errors)) <= DONE or V.shape[1] > 400:
+            break
+        columns: list[Array] = []
+        for i in np.flatnonzero(errors > DONE):
+            lam, there, both = values[i], solver, [r[:, i] for r in residuals]
+            if number >= 6 and lam.imag == 0.0 and np.isfinite(lam.real):
+                there, vectors = solver_at(float(lam.real)), np.stack([right[:, i].real, left[:, i].real], axis=1)
+                both = list((2 * lam.real * times(M, vectors) + times(C, vectors)).T)
+            columns += [*there.solve_all(np.array([part for r in both for part in (r.real, r.imag)]).T).T]
+        # by largest entries, whose squares may be no numbers any more; `new_directions` makes lengths one
+        sizes = summed(comm, np.array([np.abs(c).max(initial=0.0) for c in columns]))
+        found = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
+        if not found:
+            break
+        new = np.array(found).T
+    return values, right, left, errors

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -63,16 +64,18 @@ def style_of(name: str, color: str = "C2") -> dict[str, Any]:
     return {"color": whirls.get(name.partition(" ")[2], color), "ls": "--" if "backward" in name else "-"}
 
 
-def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
+def campbell_figure(
+    result: CampbellResult, *, fixed: bool = False, ax: Axes | None = None, orders: Sequence[int] | None = None
+) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
     It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it. With
     `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds;
-    those of a shaft with both frequencies |ω ± Ω|.
+    those of a shaft with both frequencies |ω ± Ω|. `ax` gets the frequencies alone.
     """
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
     rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
-    orders = [1] if fixed else result.summary["orders"]
+    orders = [1] if fixed else result.summary["orders"] if orders is None else orders
     first = min(0.0, *(float(b.speed[0]) for b in branches))
     last = max(0.0, *(float(b.speed[-1]) for b in branches))
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
@@ -82,8 +85,11 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     above = [b for b in branches if b not in shown]
     names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
     names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
-    figure = Figure(figsize=(WIDTH, sum(heights)))
-    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False)[:, 0]
+    figure: Any = Figure(figsize=(WIDTH, sum(heights))) if ax is None else ax.get_figure(root=True)
+    if ax is None:
+        panels = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False)[:, 0])
+    else:
+        damped, panels, heights = False, [ax], [ax.get_window_extent().height / figure.dpi]
     axis = panels[0]
     frequency = label("frequency", units.frequency, "fixed" if fixed else result.frame)
     captions = [frequency, label("log_decrement") if "log_decrement" in result.rows[0] else "damping ratio (%)"]
@@ -91,25 +97,25 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
         marks(panel, result, units, last)
     for b in shown:
-        axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
+        axis.plot(b.speed, b.frequency, lw=1.6, gid=b.name, **b.style)
         axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
         for i in np.flatnonzero(b.doubtful):
             axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
         if damped:
             there = np.isfinite(b.damping)
-            panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
+            panels[1].plot(b.speed[there], b.damping[there], lw=1.4, gid=b.name, **b.style)
     of_shaft = any("whirl" in b.name for b in shown)  # whose orders are 1X, 2X, …
     rays = [(f"{k}X" if of_shaft else f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
-    for _, slope in rays:
+    for name, slope in rays:
         reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
-        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
+        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1, gid=name)
     for name, columns in result.branches().items() if fixed else ():
         if "frequency_fixed_2" in columns:
             other = units.frequencies(columns["frequency_fixed_2"])
             said, other = "_" if name != branches[0].name else "smaller wave", np.where(other <= top, other, np.nan)
             axis.plot(units.speeds(columns["speed"]), other, lw=0.7, label=said, **style_of(name))
-    crossings(axis, result, units, fixed)
+    crossings(axis, result, units, fixed, orders)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
     name_lines(axis, shown, rays, heights[0])
@@ -125,6 +131,10 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
         write_names(panels[1], ends, NAME_HEIGHT / heights[1])
     name_styles(axis, shown)
     entries = axis.get_legend_handles_labels()
+    if ax is not None:
+        if entries[0]:
+            ax.legend(fontsize=8, frameon=False)
+        return cast(Figure, figure)
     letters = max(len(b.name) for b in shown), max(map(len, names), default=0)
     right = 0.35 + max(0.068 * letters[0], 0.06 * letters[1])
     over = 0.4 + max(0.12 * len(names), 0.2 * any(slope * last > top for _, slope in rays))
@@ -136,7 +146,7 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     figure.suptitle(result.title, fontsize=11, y=1.0 - 0.08 / height, va="top")
     if entries[0]:
         figure.legend(*entries, loc="lower center", ncols=3, fontsize=8, frameon=False)
-    return figure
+    return cast(Figure, figure)
 
 
 def fixed_figure(result: CampbellResult) -> Figure:
@@ -239,10 +249,11 @@ def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) ->
             axis.axvspan(first, end, color=color, alpha=0.12, lw=0.0, zorder=0, label=said)
 
 
-def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool) -> None:
-    """Draw critical speeds, synchronous ones filled."""
+def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool, orders: Sequence[int]) -> None:
+    """Draw critical speeds, synchronous ones filled, and those on the lines kΩ."""
     for synchronous, name in ((False, "crossing with kΩ"), (True, "synchronous critical speed")):
         there = [c for c in result.critical_speeds if (c.kind != "per_rev") == synchronous]
+        there = [c for c in there if synchronous or c.per_rev in orders]
         if there and (synchronous or not fixed):
             height = [seen_fixed(c) if fixed else c.frequency for c in there]
             speeds, heights = units.speeds([c.speed for c in there]), units.frequencies(height)

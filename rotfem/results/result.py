@@ -105,7 +105,7 @@ class Result(ABC):
         """Return what writes files that are not text into a folder, each one whole or none; none here."""
         return []
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawings(self) -> dict[str, Callable[..., Figure]]:
         """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""
         return {name: partial(resolved(f"rotfem.{function}"), self) for name, function in self.drawn().items()}
 
@@ -164,14 +164,21 @@ class Result(ABC):
         """Write all figures into a folder; return their paths."""
         return [save(draw(), folder / name) for name, draw in self.drawings().items()]
 
-    def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
-        """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it."""
+    def plot(self, path: str | Path | None = None, drawing: str = "", **options: Any) -> Figure:
+        """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it.
+
+        Args:
+            path: file that it is written to.
+            drawing: which of them, the main one by default.
+            options: of a Campbell diagram `ax`, axes to draw on, whose figure is then returned, and `orders`, the k of
+                the lines kΩ drawn in the place of those of the diagram; marked are the crossings that it has.
+        """
         drawings = {name.removesuffix(".png"): draw for name, draw in self.drawings().items()}
         name = drawing.removesuffix(".png") or next(iter(drawings), "")
         if name not in drawings:
             there = ", ".join(drawings) or "none, as too little was computed"
             raise ValueError(f"drawing {drawing!r} is not among those of this result; there is {there}")
-        figure = drawings[name]()
+        figure = drawings[name](**options)
         vars(figure)["_repr_png_"] = partial(image, figure, 72)  # Matplotlib has none without a magic of the notebook
         if path is not None:
             save(figure, Path(path))

@@ -26,8 +26,9 @@ class UnbalanceResult(Rows):
         rows: one dictionary a speed and place: `speed` (rad/s), `x` (m); amplitudes `u2`, `u3` (m) and phases
             `u2_phase`, `u3_phase` (rad, ahead of direction 2 of the shaft) in the fixed frame; semi-axes `major` and
             `minor` (m, negative of backward precession) of the orbit and `angle` (rad) of the larger one; at supports
-            the amplitudes `f2`, `f3` (N) and phases `f2_phase`, `f3_phase` of the force of the shaft on them; at a
-            probe its reading `probe` (m) and `probe_phase` (rad).
+            the amplitudes `f2`, `f3` (N) and phases `f2_phase`, `f3_phase` of the force of the shaft on them, of its
+            moment `m2`, `m3` (N·m) on those with tilting coefficients; at a probe its reading `probe` (m) and
+            `probe_phase` (rad).
         shapes: complex displacements (m), (speeds, 2, nodes), of the nodes `x` (m) of the shaft.
         x: nodes, m, increasing.
     """

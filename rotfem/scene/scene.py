@@ -7,6 +7,8 @@ complete and consistent; what does not raises one `SceneError` that names the ke
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -15,13 +17,14 @@ import numpy as np
 from pydantic import BaseModel, Field, PlainValidator, PrivateAttr, ValidationError, ValidationInfo
 
 from rotfem import registry
-from rotfem.errors import SceneError, show
+from rotfem.errors import OutputError, SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
 from rotfem.scene.loads import LoadsTable, check_in_plane, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
+    NO_STEPS,
     AngularUnit,
     BeamMesh,
     Initial,
@@ -73,7 +76,7 @@ else:
 
 
 class Scene(SceneModel):
-    """A validated scene. Immutable; `replace` makes variants.
+    """A validated scene. Immutable; `replace` makes variants. Two are equal where all that they say is.
 
     Attributes:
         structure: what moves: planar beam, spatial beam or plate.
@@ -179,6 +182,53 @@ class Scene(SceneModel):
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
         return variant
 
+    def write(self, path: str | Path, remark: str = "") -> Path:
+        """Write what was set in the scene as TOML, after a remark of comment lines; return the path.
+
+        What is read from there is equal. Paths of files that the scene reads are relative to the folder of the new one.
+
+        Raises:
+            SceneError: the scene holds a Python function, which no file can.
+            OutputError: the file cannot be written.
+        """
+        import tomli_w
+
+        path, start = Path(path), Path(self._directory)
+        files = set(map(os.path.realpath, self._inputs))
+
+        def moved(value: Any) -> Any:
+            """Return tables with the paths of files made relative to the folder of the new one."""
+            if isinstance(value, Mapping):
+                return {key: moved(entry) for key, entry in value.items()}
+            if isinstance(value, list):
+                return [moved(entry) for entry in value]
+            if not isinstance(value, str | Path) or "\0" in str(value):
+                return value
+            ours = os.path.realpath(start / value) in files and not Path(value).is_absolute()
+            return os.path.relpath(start.resolve() / value, path.parent.resolve()) if ours else str(value)
+
+        def joined(array: re.Match[str]) -> str:
+            """Return an array in a line where it fits one."""
+            line = " ".join(array[1].split()).rstrip(",")
+            return f"[{line}]" if len(line) < 100 else array[0]
+
+        try:
+            text, before = tomli_w.dumps(moved(self._tables)), ""
+            while text != before:
+                before, text = text, re.sub(r'\[\n((?: +(?![ \]])[^"{}=\n]*,\n)+) *\]', joined, text)
+        except TypeError:
+            why = "holds a Python function, so that it cannot be written as TOML"
+            raise SceneError(self._file, allowed=why) from None
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(remark + text, encoding="utf-8")
+        except OSError as error:
+            raise OutputError(path, error.strerror or str(error)) from None
+        return path
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.__dict__ == other.__dict__
+
     def showing(self, what: str, given: object) -> Self:
         """Return the scene with "speed" or "frequency" shown in the unit of a text, if it has none itself."""
         tables = with_shown(self._tables, what, given)
@@ -205,6 +255,8 @@ class Scene(SceneModel):
             how = "give its end, and step, tolerance or an accuracy"
             why = f'missing; with motion.type = "{self.motion.type}" a run is a history: {how}'
             raise SceneError(self._file, "time", None, why)
+        if self.time is not None and self.time.step is None and self.time.tolerance is None:
+            raise SceneError(self._file, "time.step", None, NO_STEPS)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
 

@@ -131,6 +131,12 @@ class SceneModel(BaseModel):
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # tables in tables are validated with theirs
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not name.startswith("_"):
+            why = "cannot be set, as scenes are never changed; scene.replace({key: value}) returns a variant"
+            raise SceneError(type(self).__name__, name, None, why)
+        super().__setattr__(name, value)
+
     def __repr__(self) -> str:
         given = {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
         return short(type(self).__name__, given)

@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-#: Family of the bending of a beam ↦ its word in names of a blade, and of another beam that an axis across it turns.
-WORDS = {"flap": ("flapwise", "out-of-plane"), "lag": ("edgewise", "in-plane")}
+#: Family of a beam's bending ↦ its word for a blade, and for others that turn about direction 3, or 2.
+WORDS = {"flap": ("flapwise", "out-of-plane", "in-plane"), "lag": ("edgewise", "in-plane", "out-of-plane")}
 
 
 class ModeName(NamedTuple):
@@ -108,15 +108,15 @@ class Wave:
         return "forward" if (self.seen_fixed(omega, speed) if self.shaft else self.share) > 0.0 else "backward"
 
 
-def shaft_wave(moves: npt.NDArray[Any], turns: npt.NDArray[Any], axis: npt.NDArray[np.float64]) -> Wave:
-    """Return the whirl of a mode of a shaft; that of torsion and stretch stands."""
+def shaft_waves(moves: npt.NDArray[Any], turns: npt.NDArray[Any], axis: npt.NDArray[np.float64]) -> list[Wave]:
+    """Return the whirl of modes of a shaft, their motions (modes, n, 3); that of torsion and stretch stands."""
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     first /= np.linalg.norm(first)
     y, z = moves @ first, moves @ np.cross(axis, first)
-    a, b = (float(np.sum(np.abs(y + sign * 1j * z) ** 2)) for sign in (1.0, -1.0))
-    along = float(np.sum(np.abs(moves @ axis) ** 2 + np.abs(turns @ axis) ** 2))
-    bends = a + b > 2.0 * along
-    return Wave(int(bends), (a - b) / (a + b) if bends else 0.0, True)
+    a, b = (np.sum(np.abs(y + sign * 1j * z) ** 2, axis=1) for sign in (1.0, -1.0))
+    bends = a + b > 2.0 * np.sum(np.abs(moves @ axis) ** 2 + np.abs(turns @ axis) ** 2, axis=1)
+    shares = np.where(bends, (a - b) / np.maximum(a + b, 1e-300), 0.0)
+    return [Wave(int(n), share, True) for n, share in zip(bends, shares.tolist(), strict=True)]
 
 
 def in_phase(y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -39,7 +39,7 @@ from rotfem.mechanics.loads import AppliedLoad
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
-from rotfem.structures.mode_names import Wave, shaft_wave
+from rotfem.structures.mode_names import Wave, shaft_waves
 from rotfem.structures.reference_rotation import SectionTurns, check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array, PointValues
@@ -297,12 +297,12 @@ class SpatialBeam(Beam):
         R = np.kron(np.eye(2), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
         return np.concatenate([np.einsum("ij,nj...->ni...", R, values[:, :6]), values[:, 6:]], axis=1)
 
-    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return the whirl of a mode where the beam is a shaft: its undeformed axis is that of the spin."""
+    def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
+        """Return the whirl of modes where the beam is a shaft: its undeformed axis is that of the spin."""
         off = np.linalg.norm(np.cross(self.places(coordinates), axis), axis=1)
         if np.max(off) > 1e-9 * self.length:  # round-off of its directions
-            return None
-        return shaft_wave(values[:, :3], self.length * values[:, 3:], axis)
+            return []
+        return shaft_waves(values[..., :3], self.length * values[..., 3:], axis)
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

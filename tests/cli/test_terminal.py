@@ -69,7 +69,7 @@ VERBS = {
     "import": ("import", "Blade.st", "-o", "imported.toml"),
     "unknown key": ("run", "arm.toml", "--set", "motion.sped=3"),
     "no theory": ("modes", "blade.toml", "--set", "model.theory=nonlinear"),
-    "failure": ("run", "blade.toml", "--set", "motion.speed=1e5 rpm"),
+    "failure": ("run", "arm.toml", "--set", "motion.speed=1e5 rpm"),
     "version": ("--version",),
 }
 

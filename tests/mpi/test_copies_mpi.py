@@ -1,4 +1,4 @@
-"""Of a small system every process computes a copy: results are those of one process, and speeds are shared out."""
+"""Of a small system every process computes a copy, with the results of one; frequencies of loads are shared out."""
 
 from __future__ import annotations
 
@@ -77,9 +77,9 @@ def test_files_of_a_plate_are_written_once(tmp_path: Path) -> None:
     assert {"modes.xdmf", "modes.h5"} <= set(two)
 
 
-def test_speeds_are_shared_out(tmp_path: Path) -> None:
+def test_a_diagram_is_that_of_one_process(tmp_path: Path) -> None:
     one, two = summaries(tmp_path, BEAM, "campbell", "--speeds", "0:6:5")
-    assert two["shared"] == "speeds"
+    assert two["shared"] == "nothing"
     rows = [json.loads((tmp_path / f"r{ranks}" / "campbell.json").read_text())["rows"] for ranks in (1, 2)]
     assert [(r["speed"], r["label"]) for r in rows[0]] == [(r["speed"], r["label"]) for r in rows[1]]
     for name in ("frequency", "damping"):

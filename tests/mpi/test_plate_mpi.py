@@ -17,30 +17,21 @@ pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there 
 RECTANGLE = {"shape": "length = 1.0\nwidth = 0.6\npoint_masses = [[0.83, 0.1, 1.0]]", "mesh": "elements = [5, 4]"}
 
 
-def test_modes_on_three_processes(tmp_path: Path) -> None:
-    """To 1e-8; of linear theories, and Campbell diagrams, on two processes to 1e-5 in `tests.pairs`."""
-    (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**RECTANGLE))
-    found, labels = [], []
-    for ranks in (1, 3):
-        done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots")
-        assert done.returncode == 0, done.stderr
-        rows = json.loads(done.stdout)["modes"]
-        found.append([row["frequency"] for row in rows])
-        labels.append([row["label"] for row in rows])
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
-    assert labels[1] == labels[0]
-
-
 def test_modes_of_a_large_plate_on_two_processes(tmp_path: Path) -> None:
-    """More than 5000 unknowns, whose pairs are computed by blocks; on one process from those of half the cells."""
+    """More than 5000 unknowns, whose pairs are computed by blocks; on one process from those of half the cells.
+
+    To 1e-8; of linear theories, and Campbell diagrams, to 1e-5 in `tests.pairs`.
+    """
     large = RECTANGLE | {"mesh": "elements = [16, 16]"}
     (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**large))
     found = []
     for ranks in (1, 2):
         done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots")
         assert done.returncode == 0, done.stderr
-        found.append([row["frequency"] for row in json.loads(done.stdout)["modes"]])
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
+        found.append(json.loads(done.stdout)["modes"])
+    one, two = ([row["frequency"] for row in rows] for rows in found)
+    np.testing.assert_allclose(two, one, rtol=1e-8)
+    assert [row["label"] for row in found[1]] == [row["label"] for row in found[0]]
 
 
 def test_history_on_two_processes(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from rotfem.accuracy.answer import Answers
 from rotfem.accuracy.ladder import Clock
-from rotfem.accuracy.tuned import write_variant
 from rotfem.commands.cost import Study, pareto, recommend
 from rotfem.commands.explain import Output
 from rotfem.errors import SceneError
@@ -89,9 +88,9 @@ def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Any) -> None:
     (tmp_path / "scenes" / "beam.toml").write_text(text)
     scene = load_scene(tmp_path / "scenes" / "beam.toml", ["structure.tip_mass=0.25"])
     (tmp_path / "out").mkdir()
-    path = write_variant(scene, {"model.theory": "second_order"}, tmp_path / "out" / "t.toml", "# two\n# lines\n\n")
+    path = scene.replace({"model.theory": "second_order"}).write(tmp_path / "out" / "t.toml", "# two\n# lines\n\n")
     tuned = load_scene(path)
     assert (tuned.motion, tuned.structure, tuned.model.theory) == (scene.motion, scene.structure, "second_order")
     law = Scene.from_dict(BEAM | {"motion": {"type": "callable", "speed": lambda t: 1.0}})
     with pytest.raises(SceneError, match="Python function"):
-        write_variant(law, {}, tmp_path / "t.toml", "")
+        law.write(tmp_path / "t.toml")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
+import ufl
+from matplotlib.figure import Figure
 
 import rotfem
 from rotfem.commands.cli import app
@@ -189,3 +191,109 @@ def test_sweep_over_a_key_with_its_table() -> None:
     assert swept.to_pandas()["frequency_1"].iloc[1] == pytest.approx(alone.frequencies[0], rel=1e-12)
     with pytest.raises(InputError, match="unexpected keyword argument 'sped'"):
         rotfem.sweep(scene, {"motion.speed": [1.0, 2.0]}, "modes", sped=1)
+
+
+# --- as in a notebook -------------------------------------------------------------------------------------------------
+
+CELL = """
+import rotfem
+
+def spring(m, delta):
+    return sum(STIFFNESS * m.k.q[1] * delta.of(body)[1] * body.measure for body in m.positions())
+
+rotfem.register(rotfem.Effect("bed", spring))
+"""
+
+
+@pytest.fixture
+def bed() -> Iterator[None]:
+    yield
+    rotfem.registry.effects.remove("bed")
+
+
+def test_a_cell_registers_a_name_again(bed: None) -> None:
+    """A bed of stiffness k under a rod of mass ρA adds k/ρA to ω²."""
+    squares = []
+    for stiffness in ("0.0", "1.2"):
+        exec(CELL.replace("STIFFNESS", stiffness), {})
+        squares.append(rotfem.modes(tables(motion={"type": "constant", "speed": 0.0}), error=False).frequencies[0] ** 2)
+    assert squares[1] - squares[0] == pytest.approx(1.0, rel=1e-6)
+    with pytest.raises(ValueError, match="'bed' is the name of another effect already; replace=True"):
+        exec(CELL, {"__file__": "two.py"})
+    exec(CELL.replace("spring))", "spring), replace=True)"), {"__file__": "two.py"})
+    with pytest.raises(ValueError, match="'coriolis' is the name of another effect"):
+        exec(CELL.replace("bed", "coriolis"), {})
+
+
+def test_campbell_on_axes_of_a_figure_of_ones_own() -> None:
+    diagram = rotfem.campbell(tables(modes={"count": 2}), "0:30:3rpm", orders=2, error=False)
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    assert diagram.plot(ax=left, orders=[1, 3]) is figure
+    assert {"Ω", "3Ω", "1st edgewise"} <= {text.get_text() for text in left.texts}
+    assert "2Ω" not in {text.get_text() for text in left.texts}
+    assert left.lines
+    assert not right.lines
+
+
+def test_a_scene_that_is_written_reads_back_equal(tmp_path: Path) -> None:
+    (tmp_path / "spin.csv").write_text("0, 0\n1, 2\n")
+    given = tables(
+        motion={"type": "table", "table": "spin.csv"}, loads={"tip_force": {"over_time": [[0, 0, 1], [1, 0, 2]]}}
+    )
+    scene = rotfem.Scene.from_dict(given, directory=tmp_path)
+    back = rotfem.load_scene(scene.write(tmp_path / "there" / "scene.toml", "# a remark\n"))
+    assert back == scene
+    assert back != scene.replace({"time.end": 0.3})
+    with pytest.raises(rotfem.SceneError, match="holds a Python function"):
+        scene.replace({"loads.tip_force": lambda t: [0.0, t]}).write(tmp_path / "scene.toml")
+
+
+def test_a_scene_is_not_changed_and_says_so_in_a_line() -> None:
+    scene = rotfem.Scene.from_dict(tables())
+    with pytest.raises(InputError, match=r"^ConstantMotion: speed: cannot be set, .*scene\.replace.*$"):
+        scene.motion.speed = 2.0
+
+
+@pytest.mark.parametrize(
+    ("strains", "said"),
+    [
+        (lambda q: (q[0].dx(0), q[2].dx(0)), "returns 2 strains, a planar beam needs 3"),
+        (lambda q: (q[0].dx(0), q[1].dx(0) - q[3], q[2].dx(0)), r"q has 3 entries \(u1, u2, alpha\)"),
+    ],
+)
+def test_what_a_theory_of_a_user_lacks(strains: Any, said: str) -> None:
+    rotfem.register(rotfem.Theory("of_mine", 3.5, {"planar_beam": strains}))
+    try:
+        with pytest.raises(ValueError, match=said):
+            rotfem.Problem.of(tables(model={"theory": "of_mine"})).system()
+    finally:
+        rotfem.registry.theories.remove("of_mine")
+
+
+def test_explain_goes_on_without_an_effect_that_the_theory_cannot_have(bed: None) -> None:
+    def root(m: Any, delta: Any) -> Any:
+        size = ufl.sqrt(1 + ufl.inner(m.frame.w, m.frame.w))
+        return sum(size * m.k.q[1] * delta.of(body)[1] * body.measure for body in m.positions())
+
+    rotfem.register(rotfem.Effect("bed", root))
+    rows = rotfem.explain(tables(model={"theory": "linear"}, mesh={"elements": 1})).to_pandas()
+    assert rows.loc["bed", "verdict"] == "not available"
+    assert "is no polynomial" in rows.loc["bed", "why"]
+    assert rows.loc["centrifugal", "verdict"] != "not available"
+
+
+def test_a_problem_has_the_diagram_and_the_response_of_its_scene() -> None:
+    force = {"tip_force": {"harmonic": {"amplitude": [0, 1], "frequency": 1}}}
+    scene = rotfem.Scene.from_dict(tables(modes={"count": 2}, loads=force, model={"theory": "consistent_linear"}))
+    of_scene = rotfem.Problem.of(scene)
+    one, other = of_scene.campbell("0:30:3rpm", count=2), rotfem.campbell(scene, "0:30:3rpm", error=False)
+    assert one.frequencies == pytest.approx(other.frequencies, rel=1e-12)
+    assert one.critical_speeds == other.critical_speeds
+    answer = of_scene.response("0.1 Hz", "2 Hz", number=20, count=2, speed="10 rpm")
+    at = rotfem.response(scene.replace({"motion.speed": "10 rpm"}), "0.1 Hz", "2 Hz", number=20)
+    assert abs(answer.direct - at.direct).max() <= 1e-12 * abs(at.direct).max()
+    script = problem().replace(loads=rotfem.Loads(**force))
+    assert script.response(number=5, count=1).outputs == answer.outputs
+    with pytest.raises(InputError, match="needs a harmonic load"):
+        problem().response()

@@ -37,13 +37,11 @@ def test_what_is_lost_is_said() -> None:
 
 def test_no_instability_out_of_round_off() -> None:
     """At rest nothing is unstable, whatever round-off makes of the eigenvalues; campbell says so, too."""
-    for scene in (beam(1e-7, 64), viscous(1e-7)):
-        result = modes(scene)
-        assert all(not row["stability"].endswith("instability") for row in result.rows)
-        diagram = campbell(scene, [0.0, 0.1])
-        assert diagram.summary["instabilities"] == []
-        said = (*result.summary["warnings"], *diagram.summary["warnings"])
-        assert not any("instability" in text for text in said)
+    diagram = campbell(beam(1e-7, 64), [0.0, 0.1])
+    assert diagram.summary["instabilities"] == []
+    for result in (diagram, modes(beam(1e-7, 64)), modes(viscous(1e-7))):
+        assert not any(str(row.get("stability")).endswith("instability") for row in result.rows)
+        assert not any("instability" in text for text in result.summary["warnings"])
 
 
 def test_an_instability_that_is_one() -> None:
