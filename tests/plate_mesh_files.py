@@ -31,6 +31,8 @@ axis = [0.2, 1.0, 0.5]
 count = 5
 [loads]
 tip_force = [0, 0, 300.0]
+[output]
+error = false
 """
 
 

@@ -97,10 +97,8 @@ def _grown(system: System, omega: float, newton: Newton, notes: list[str]) -> Ar
     try:
         found = raised(system, omega, newton)
     except Unbegun as error:
-        if not omega:
-            raise
         try:
-            found = raised(system, omega, newton, spun=True)
+            return _loaded_at_speed(system, omega, newton)
         except ComputationError:
             raise error from None
     if found.least < REGULAR_SHARE:
@@ -223,13 +221,27 @@ class Unbegun(ComputationError):
     """No share of the load has an equilibrium that is found from the undeformed structure."""
 
 
-def set_load(system: System, omega: float, share: float, spun: bool = False) -> None:
-    """Write a share of the load into a system: of loads, gravity and, unless it is spun up, of the squared speed."""
-    system.set_time(0.0, system.motion.at_speed((1.0 if spun else float(np.sqrt(share))) * omega), share)
+def set_load(system: System, omega: float, share: float) -> None:
+    """Write a share of the load into a system: of the square of a speed (rad/s), and of loads and gravity."""
+    system.set_time(0.0, system.motion.at_speed(float(np.sqrt(share)) * omega), share)
 
 
-def raised(system: System, omega: float, newton: Newton, spun: bool = False) -> Raised:
-    """Return the equilibrium at full load, in one step or by halved ones; spun, from that at full speed without loads.
+def _loaded_at_speed(system: System, omega: float, newton: Newton) -> Array:
+    """Return the stable equilibrium at full load that is next to that at full speed without loads.
+
+    Tension by spin may be all the stiffness there is, as of a tether: then a small load at a small speed moves it far.
+    """
+    system.count_rotations_from(None)
+    alone = Newton(newton.tolerance, newton.max_iterations)  # how a stretch converges says nothing of bending
+    q = balance(system, omega, 0.0, system.zeros(), alone, spun=True)
+    q = balance(system, omega, 1.0, q, newton)
+    if newton.wandered or negative_count(system.tangent(1.0, 0.0, 0.0)[0], sure=True) != 0:
+        raise ComputationError("the equilibrium is not next to that without loads, or not stable")
+    return counted(system, omega, q, newton)
+
+
+def raised(system: System, omega: float, newton: Newton) -> Raised:
+    """Return the equilibrium at full load, in one step or by halved ones.
 
     Where there are several equilibria, a step may end at any of them. So a step is halved, too, where an increment of
     Newton's method was beyond its tangent, where the step turns back on the one before, or where the stiffness gets a
@@ -238,17 +250,14 @@ def raised(system: System, omega: float, newton: Newton, spun: bool = False) -> 
     """
     system.count_rotations_from(None)
     q, done, share, least = system.zeros(), 0.0, 1.0, 1.0
-    if spun:
-        straight = Newton(newton.tolerance, newton.max_iterations)  # how it converges says nothing of bending
-        q = balance(system, omega, 0.0, q, straight, spun=True)
     reference, critical, before = system.reference, None, None
     while done < 1.0:
         target, afresh = min(1.0, done + share), False
         try:
-            new = balance(system, omega, target, q, newton, spun=spun)
+            new = balance(system, omega, target, q, newton)
             wandered = newton.wandered
             negative = negative_count(system.tangent(1.0, 0.0, 0.0)[0], sure=True) or 0
-            new = counted(system, omega, new, newton, target, spun)
+            new = counted(system, omega, new, newton, target)
         except BeyondReach as error:
             turns = system.structure.turns
             failure, afresh = error.what, turns is not None and turns.reached(q) > 0.3
@@ -329,27 +338,22 @@ def let_go(system: System, omega: float, newton: Newton) -> Array:
         hold(0.0)
 
 
-def counted(system: System, omega: float, q: Array, newton: Newton, share: float = 1.0, spun: bool = False) -> Array:
+def counted(system: System, omega: float, q: Array, newton: Newton, share: float = 1.0) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again."""
     system.check_reach(q)
     turns = system.structure.turns
     if turns is None or not turns.is_due(q):
         return q
-    return balance(system, omega, share, recounted(system, q), newton, spun=spun)
+    return balance(system, omega, share, recounted(system, q), newton)
 
 
 def balance(
-    system: System,
-    omega: float,
-    share: float,
-    guess: Array,
-    newton: Newton,
-    *,
-    checked: bool = True,
-    spun: bool = False,
+    system: System, omega: float, share: float, guess: Array, newton: Newton, checked: bool = True, spun: bool = False
 ) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method at a share of the load (see `set_load`)."""
-    set_load(system, omega, share, spun)
+    """Solve F(q, 0, 0) = 0 by Newton's method at a share of the load, with `spun` of that but the speed."""
+    set_load(system, omega, share)
+    if spun:
+        system.set_time(0.0, system.motion.at_speed(omega), share)
     q = guess.copy()
 
     def correction(before: Array | None) -> Array:

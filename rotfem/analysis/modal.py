@@ -197,21 +197,20 @@ class Spinning:
         One that nothing holds, zero to round-off, is "rigid body".
         """
         families, structure = [name for name in self.shares if name != "hub"], self.analysis.structure
-        out, rigid = [], []
-        for j, x in enumerate(self.right.T):
+        out, shapes = [], [structure.nodes(x) for x in self.right.T]
+        for j, shape in enumerate(shapes):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
-            nodes = structure.nodes(x)
-            name = structure.mode_name(first, *nodes)
-            mixed = others and self.shares[first][j] < 0.8
-            out.append(name.mixed_with(structure.word(others[0])) if mixed else name)
-            rigid.append(bool(self.pairs.bounds[j] >= 1.0 and structure.is_rigid(*nodes)))
+            name, mixed = structure.mode_name(first, *shape), others and self.shares[first][j] < 0.8
+            out.append(name.mixed_with(structure.words.get(others[0], others[0])) if mixed else name)
         pencil, pairs, speed = self.pencil, self.pairs, self.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
             sure = (pairs.bounds < 1.0) & pencil.stiff(pairs.right)
             out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))), sure)
         out = with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
-        return [RIGID_BODY if alone else name for name, alone in zip(out, rigid, strict=True)]
+        for j in np.flatnonzero(pairs.bounds >= 1.0):
+            out[j] = RIGID_BODY if structure.is_rigid(*shapes[j]) else out[j]
+        return out
 
 
 def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:

@@ -371,7 +371,7 @@ register(Newmark)
 
 @dataclass(frozen=True)
 class EnergyConserving(Scheme):
-    """Conserves the energy to round-off; nothing is damped, resolved or not."""
+    """Conserves the energy to round-off, on a free hub to its order; nothing is damped, resolved or not."""
 
     name: ClassVar[str] = "energy_conserving"
     order: ClassVar[int] = 2

@@ -32,10 +32,11 @@ def check_of(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
 
 
 def in_own_setting(scene: Scene) -> Scene:
-    """Return a scene without its accuracy, with all effects where that would choose them."""
+    """Return a scene without its accuracy, with all effects where that would choose them, and with steps."""
     changes: dict[str, Any] = dict.fromkeys(("accuracy", "accuracy_of", "accuracy_budget"))
     if scene.time is not None:  # an accuracy may have given its steps
-        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
+        tolerance = scene.time.tolerance or (1e-3 if scene.time.step is None else None)
+        changes |= {"time.tolerance": tolerance, "time.step": scene.time.step}
     if scene.model.effects == "needed":
         changes["model.effects"] = "auto"
     return scene.replace(changes)

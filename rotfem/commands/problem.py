@@ -29,7 +29,7 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results.modes import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.settings import estimates_error
+from rotfem.scene.settings import NO_STEPS, estimates_error
 from rotfem.units import si
 from rotfem.users_functions import number_of
 
@@ -217,6 +217,8 @@ class Problem(ProblemData):
                 a section that cannot be computed with.
             ComputationError: a step failed, however short.
         """
+        if step is None and tolerance is None:
+            raise InputError("time.step", None, NO_STEPS)
         given = {"end": end, "step": step, "tolerance": tolerance}
         time = Time(**{name: value for name, value in given.items() if value is not None})
         scheme = scheme or scheme_of(time)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 from rotfem.commands.console import Job, Session
-from rotfem.errors import ComputationError, SceneError, Stopped
+from rotfem.errors import ComputationError, SceneError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.scene import Scene
 from rotfem.scene.scene import as_scene
@@ -401,11 +401,13 @@ def explain(
         SceneError: the scene is not valid.
     """
     with begun("explain", scene, common) as job:
-        from rotfem.commands.explain import explained
+        from rotfem.commands.explain import Explanation
 
         job.check_writable("--write", write, job.scene.inputs)
         given = job.scene if accuracy is None else job.scene.replace({"accuracy": accuracy})
-        result = job.finish(explained(given, job.comm, progress, terms))
+        with input_of(given.file):
+            found = Explanation(given, terms or {}, job.comm).result(progress or silent)
+        result = job.finish(found)
         if write is not None and job.first:
             within = result.summary["needed"]["accuracy"]
             remark = f"# {given.name} with the theory and the effects that it needs for {within:g}.\n\n"

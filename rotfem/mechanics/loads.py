@@ -289,6 +289,7 @@ def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float
         places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
         return PlaceLoad(kind=kind, function=at, probes=places, constant=not timed)
     terms = [_harmonic(harmonic, angle) for harmonic in getattr(given, "harmonic", ())]
+    terms += [_gust(gust) for gust in getattr(given, "gust", ())]
     if callable(value):
         of_time = checked(value, key, size, "time", planar)
         each = Shapes.uniform(np.eye(size))
@@ -306,14 +307,28 @@ def load_of(key: str, given: Any, structure: Any, angle: Callable[[float], float
 
 def _harmonic(given: Any, angle: Callable[[float], float]) -> Term:
     """Return one shape with the amplitude cos(α(t) + phase), α = ω t or per_rev · ψ(t)."""
-    amplitude, rate = given.amplitude, given.frequency or given.per_rev or 0.0
-    shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
+    rate = given.frequency or given.per_rev or 0.0
 
     def at(t: Array) -> Array:
         turned = t if given.per_rev is None else np.array([angle(float(s)) for s in t])
         return np.asarray(np.cos(rate * turned + given.phase)[:, None])
 
-    return Term(shapes, at, linear=False, largest=np.ones(1), phase=given.phase)
+    return Term(_shapes(given.amplitude), at, linear=False, largest=np.ones(1), phase=given.phase)
+
+
+def _gust(given: Any) -> Term:
+    """Return one shape with the amplitude ½ (1 − cos(2π (t − start)/duration)) while the gust lasts."""
+
+    def at(t: Array) -> Array:
+        part = np.clip((t - given.start) / given.duration, 0.0, 1.0)
+        return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * part))[:, None]
+
+    ends = (given.start, given.start + given.duration)
+    return Term(_shapes(given.amplitude), at, ends, linear=False, largest=np.ones(1))
+
+
+def _shapes(amplitude: Any) -> Shapes:
+    return Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
 
 
 def is_moment(name: str) -> bool:

@@ -99,7 +99,6 @@ COLUMNS = {
     "frequency_fixed": ("frequency, fixed frame", "rad/s"),
     "frequency_fixed_2": ("frequency of the smaller wave, fixed frame", "rad/s"),
     "estimate": ("estimated relative change", "1"),
-    "truth": ("relative change of the full models", "1"),
     "worst": ("largest estimated relative change", "1"),
     "step": ("time step", "s"),
     "total_error": ("error, that of the theory included, relative", "1"),

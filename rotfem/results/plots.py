@@ -36,6 +36,9 @@ VISIBLE = 1e-3
 #: Inches around panels: left of one, right of one, below the lowest, from the top of one to that of the next.
 LEFT, RIGHT, BELOW, ROW = 0.85, 0.2, 0.5, 1.75
 
+#: How the title of a panel stands above its left end.
+CAPTION: Any = {"fontsize": 8, "loc": "left", "pad": 3, "y": 1.0}
+
 
 def dress(panel: Axes, x: str = "", y: str = "", size: float | None = 8) -> None:
     """Give a panel its grid and the labels of its axes, in letters of a size in points (Matplotlib's own if None)."""
@@ -87,11 +90,6 @@ def power_of_ten(value: float, place: float = 0.0) -> str:
     return "10" + str(round(np.log10(value))).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def caption(panel: Axes, text: str) -> None:
-    """Write what a panel shows above its left end."""
-    panel.set_title(text, fontsize=8, loc="left", pad=3, y=1.0)
-
-
 def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
     """Return the columns that have a panel, and the title with a further line that names the others."""
     zero = zeros(columns)
@@ -101,23 +99,16 @@ def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
     return [name for name in columns if name not in zero], title
 
 
-def stacked(
-    x: str,
-    at: Array,
-    columns: Mapping[str, Array],
-    title: str,
-    units: Mapping[str, str] | None = None,
-    below: float = 0.0,
-) -> Figure:
+def stacked(x: str, at: Array, columns: Mapping[str, Array], title: str, below: float = 0.0, **units: str) -> Figure:
     """Return one panel a column, or columns (n, m), over the abscissa x, with marks where it is a position.
 
-    `units` has those that are not the usual ones; `below` is room for a legend, inch.
+    Below them is room for a legend, inch; `units` are those of columns that have not the usual ones.
     """
-    units, (shown, title) = units or {}, not_zero(columns, title)
+    shown, title = not_zero(columns, title)
     figure, panels = panels_over(label(x), len(shown), title, below=below)
     for panel, name in zip(panels, shown, strict=True):
         panel.plot(at, columns[name], lw=1.0 if x == "t" else 1.2, marker="" if x == "t" else ".", ms=4)
-        caption(panel, described(name)[0])
+        panel.set_title(described(name)[0], **CAPTION)
         panel.set_ylabel(shown_unit(name, units.get(name, "")))
         panel.set_xlim(at[0], at[-1])
     return figure
@@ -137,7 +128,7 @@ def history_figure(result: RunResult) -> Figure:
         hub = [name for name in hub if not name.startswith("psi")]
         title += f", {units.speeds(speed[0]):.6g} {units.speed}"
     columns = {name: units.speeds(speed) if name == "psi_dot" else history[name] for name in (*tip, *hub)}
-    return stacked("t", history["t"], columns, title, {"psi_dot": units.speed})
+    return stacked("t", history["t"], columns, title, psi_dot=units.speed)
 
 
 def loads_figure(result: RunResult) -> Figure:
@@ -147,7 +138,9 @@ def loads_figure(result: RunResult) -> Figure:
 
 
 def shape_figure(result: RunResult) -> Figure:
-    """Return the components of a steady state along the structure."""
+    """Return the components of a steady state along a beam; of a plate maps of the final displacements."""
+    if result.triangles is not None:
+        return fields_figure(result.shape, result.triangles, ["u1", "u2", "u3"], heading(result) + ", final shape")
     components = {name: values for name, values in result.shape.items() if name != "x"}
     return stacked("x", result.shape["x"], components, heading(result) + ", steady state")
 
@@ -187,7 +180,7 @@ def shapes_figure(result: ModesResult) -> Figure:
                 drawn[name] = panel.plot(x, real, lw=1.4, color=f"C{c}", label=what)[0]
             if np.max(np.abs(imaginary)) > VISIBLE:
                 panel.plot(x, imaginary, lw=1.0, ls="--", color=f"C{c}")
-        caption(panel, f"{row['mode']}  {row['label']}, {frequency}")
+        panel.set_title(f"{row['mode']}  {row['label']}, {frequency}", **CAPTION)
         panel.set_xlim(x[0], x[-1])
         panel.set_ylabel("shape (–)")
     handles = [drawn[name] for name in names if name in drawn]
@@ -248,11 +241,10 @@ def maps(number: int, mesh: Triangulation, title: str) -> tuple[Figure, list[Axe
     figure.suptitle(title, fontsize=10, wrap=True)
     axes = [figure.add_subplot(rows, columns, i + 1) for i in range(number)]
     for i, axis in enumerate(axes):
-        axis.set_aspect("equal")
+        left, lowest = i % columns == 0, i + columns >= number
+        axis.set(aspect="equal", xlabel="x (m)" * lowest, ylabel="y (m)" * left)
         axis.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-        axis.tick_params(labelsize=7, labelleft=i % columns == 0, labelbottom=i + columns >= number)
-        axis.set_xlabel("x (m)" if i + columns >= number else "", fontsize=8)
-        axis.set_ylabel("y (m)" if i % columns == 0 else "", fontsize=8)
+        axis.tick_params(labelsize=7, labelleft=left, labelbottom=lowest)
     return figure, axes
 
 
@@ -295,11 +287,6 @@ def fields_figure(columns: Mapping[str, Array], triangles: Array, names: list[st
         axis.set_title(described(name)[0], fontsize=9)
         add_bar(figure, draw(axis, mesh, columns[name]), axis, label(name))
     return figure
-
-
-def plate_figure(result: RunResult) -> Figure:
-    """Return maps of the displacements of the final shape."""
-    return fields_figure(result.shape, result.triangles, ["u1", "u2", "u3"], heading(result) + ", final shape")
 
 
 def resultants_figure(result: RunResult) -> Figure:

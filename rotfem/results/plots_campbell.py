@@ -97,19 +97,19 @@ def campbell_figure(
         dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
         marks(panel, result, units, last)
     for b in shown:
-        axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
+        axis.plot(b.speed, b.frequency, lw=1.6, gid=b.name, **b.style)
         axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
         for i in np.flatnonzero(b.doubtful):
             axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
         if damped:
             there = np.isfinite(b.damping)
-            panels[1].plot(b.speed[there], b.damping[there], lw=1.4, **b.style)
+            panels[1].plot(b.speed[there], b.damping[there], lw=1.4, gid=b.name, **b.style)
     of_shaft = any("whirl" in b.name for b in shown)  # whose orders are 1X, 2X, …
     rays = [(f"{k}X" if of_shaft else f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
-    for _, slope in rays:
+    for name, slope in rays:
         reach = top / slope
         x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
-        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
+        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1, gid=name)
     for name, columns in result.branches().items() if fixed else ():
         if "frequency_fixed_2" in columns:
             other = units.frequencies(columns["frequency_fixed_2"])

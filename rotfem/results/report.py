@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 import tomli_w
 from matplotlib.colors import to_hex
-from matplotlib.lines import Line2D
 
 from rotfem.results.columns import Columns, ShortTable, ShownUnits, label_of, number
 from rotfem.results.files import json_text, write_text
@@ -30,9 +29,6 @@ Array = npt.NDArray[np.float64]
 
 #: Points of a line, and rows of a table, at most; numbers of modes that move.
 MOST_ROWS, MOST_NUMBERS = 2000, 60_000
-
-#: Largest displacement of a mode that moves, part of the size of the structure.
-AMPLITUDE = 0.15
 
 
 def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
@@ -199,8 +195,8 @@ def panel(axes: Any, x_range: Any) -> Any:
             way = "width" if across else "height"
             plot.add_layout(Span(location=place, dimension=way, line_color=colour, line_dash=dash, line_width=1))
             continue
-        said = str(line.get_label())
-        said = _text_at(axes, line, colour) if said.startswith("_") else said
+        said = str(line.get_gid() or line.get_label())
+        said = "" if said.startswith("_") else said
         x, y = thinned(np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
         drawn = named.setdefault(said, [])
         if style in dashes:
@@ -224,13 +220,6 @@ def panel(axes: Any, x_range: Any) -> Any:
     return plot
 
 
-def _text_at(axes: Any, line: Line2D, colour: str) -> str:
-    """Return the text of a line's colour that stands nearest to its end; nothing where there is none."""
-    end = float(np.asarray(line.get_ydata(), dtype=np.float64)[-1])
-    there = [text for text in axes.texts if to_hex(text.get_color()) == colour and hasattr(text, "xy")]
-    return str(min(there, key=lambda text: abs(float(text.xy[1]) - end)).get_text()) if there else ""
-
-
 def thinned(x: Array, y: Array) -> tuple[Any, Any]:
     """Return a line by `MOST_ROWS` at most: of every stretch its lowest and highest point."""
     if len(x) > MOST_ROWS:
@@ -249,17 +238,14 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         return {}, ""
     surface = result.surface
     ends = np.concatenate([surface.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
-    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-    extent = float(np.linalg.norm(high - low))
-    moves, cards = [], ""
+    middle, moves, cards = (surface.points.min(axis=0) + surface.points.max(axis=0)) / 2, [], ""
     for row, shape, frequency in result.with_shapes()[: max(1, MOST_NUMBERS // (6 * len(surface.points)))]:
-        z = surface.moved(shape)
-        z *= AMPLITUDE * extent / max(float(np.max(np.abs(z))), 1e-300)
+        z = surface.scale(shape) * surface.moved(shape)
         moves.append([np.round(part, 5).tolist() for part in (z.real, z.imag)])
         said = escape(f"{row['mode']}: {row['label']}, {frequency}")
         cards += f"<figure><canvas></canvas><figcaption>{said}</figcaption></figure>"
-    data = {"points": np.round(surface.points, 5).tolist(), "shapes": moves, "extent": extent}
+    data = {"points": np.round(surface.points, 5).tolist(), "shapes": moves, "extent": surface.size}
     if result.frame == "fixed":  # orbits of one corner of some sections
         data["orbits"] = (4 * np.unique(np.linspace(0, len(surface.points) // 4 - 1, 9).round())).astype(int).tolist()
-    data |= {"lines": np.unique(np.sort(ends, axis=1), axis=0).tolist(), "middle": ((low + high) / 2).tolist()}
+    data |= {"lines": np.unique(np.sort(ends, axis=1), axis=0).tolist(), "middle": middle.tolist()}
     return data, f'<p class="hint">Drag to turn the view.</p><div class="modes">{cards}</div>'

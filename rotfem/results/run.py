@@ -127,16 +127,15 @@ class RunResult(Result):
 
     def drawn(self) -> dict[str, str]:
         """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""
-        over_time, is_plate = len(self.history.get("t", ())) > 1, self.triangles is not None
+        over_time = len(self.history.get("t", ())) > 1
         there = {
             "history": over_time,
             "loads": over_time and any(name.startswith("root_") for name in self.history),
-            "shape": bool(self.shape) and (is_plate or not over_time),
+            "shape": bool(self.shape) and (self.triangles is not None or not over_time),
             "resultants": bool(self.resultants),
             "stations": self.stations is not None and len(self.stations.t) > 0,
         }
-        draw = {name: "plate" if name == "shape" and is_plate else name for name in there}
-        return {f"{name}.png": f"results.plots:{draw[name]}_figure" for name, drawn in there.items() if drawn}
+        return {f"{name}.png": f"results.plots:{name}_figure" for name, drawn in there.items() if drawn}
 
     def tables(self) -> list[ShortTable]:
         """Return extremes and last values of the tip's displacement and of a free hub, of a steady state all values."""
@@ -144,21 +143,16 @@ class RunResult(Result):
         ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
         if self.steady:
             scales = by_unit(ends)
-            return [
-                ShortTable(
-                    (f"{self.frame} frame", "value"), [(named(name), number(ends[name], scales[name])) for name in ends]
-                )
-            ]
+            values = [(named(name), number(ends[name], scales[name])) for name in ends]
+            return [ShortTable((f"{self.frame} frame", "value"), values)]
         shown = [name for name in ends if name.startswith(("tip_u", *HUB)) and f"{name}_min" in found]
         scales = by_unit({name: largest(found[f"{name}_{end}"] for end in ("min", "max")) for name in shown})
         head, rows = [f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"], []
         for name in shown:
             low, high, last = (number(found[f"{name}_{end}"], scales[name]) for end in ("min", "max", "final"))
             when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
-            residual = found.get(f"{name}_residual")
-            rows.append(
-                (named(name), low, when[0], high, when[1], last, *([] if residual is None else [f"{residual:.6g}"]))
-            )
+            residual = [f"{found[key]:.6g}" for key in [f"{name}_residual"] if key in found]
+            rows.append((named(name), low, when[0], high, when[1], last, *residual))
         if "torque_end" in found:
             head.append(f"± after {found['torque_end']:.6g} s")
         return [ShortTable(tuple(head), rows)] if rows else []

@@ -29,6 +29,9 @@ HALF_WIDTH = np.sqrt(3.0)
 #: Least half width of the broader side of a section, part of the length, so that one sees it turn.
 LEAST = 0.012
 
+#: Largest displacement of a mode in a picture, part of the size of the structure.
+WARP = 0.15
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -72,6 +75,19 @@ class Surface:
         u, turns = self._at_points(whole)
         return np.asarray(u + np.cross(turns / self.length, self.arms))
 
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around the surface, m."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    def scale(self, shape: Mapping[str, Array]) -> float:
+        """Return what a mode is multiplied by in pictures (m): `WARP` of the size, or a turn of 1 rad, the lesser one.
+
+        Displacements by larger turns, as of a thin shaft in torsion, are not linear.
+        """
+        turns = [np.abs(values) / self.length for name, values in shape.items() if name.startswith(("theta", "alpha"))]
+        return 1.0 / float(max(np.max(np.abs(self.moved(shape))) / (WARP * self.size), np.max(turns, initial=1e-300)))
+
     def displaced(self, columns: Mapping[str, Array]) -> Array:
         """Return the displacements (k, 3), m, of the points by components at the nodes: u1, … (m), theta1, … (rad)."""
         from scipy.spatial.transform import Rotation  # slow to load
@@ -89,8 +105,8 @@ class Surface:
 
 # --- animations -------------------------------------------------------------------------------------------------------
 
-#: Largest displacement in a picture, part of the structure's size; frames of an animation, which takes a second.
-WARP, FRAMES = 0.15, 24
+#: Frames of an animation, which takes a second.
+FRAMES = 24
 
 
 def animate(result: Any, mode: int, folder: Path) -> list[Path]:
@@ -111,8 +127,7 @@ def animate(result: Any, mode: int, folder: Path) -> list[Path]:
     speed = f"{units.speeds(result.speed):.5g} {units.speed}"
     faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles]).ravel()
     rest, z = pyvista.PolyData(surface.points, faces), surface.moved(shape)
-    moving, size = rest.copy(), float(np.max(np.ptp(surface.points, axis=0)))
-    scale = WARP * size / float(np.max(np.linalg.norm(np.abs(z), axis=1)))
+    moving, size, scale = rest.copy(), surface.size, surface.scale(shape)
     leading = int(np.argmax(np.max(np.abs(z), axis=0)))
     name, peak = f"u{leading + 1}", float(np.max(np.abs(z[:, leading])))
 

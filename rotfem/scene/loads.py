@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, ValidationInfo, field_validator
 
 from rotfem.scene.files import is_path, read_rows
@@ -58,11 +59,15 @@ def are_rows(value: Any) -> bool:
 
 
 def check_grid(rows: Matrix) -> Matrix:
-    """Return rows (x, t, …); refuse them unless every x (m), at least two, stands once with every t (s)."""
-    counts = [len({row[k] for row in rows}) for k in (0, 1)]
-    if min(counts) < 2 or not len(rows) == len({row[:2] for row in rows}) == counts[0] * counts[1]:
-        raise problem("", None, "must have every t at every x, each once, and at least two of both")
-    return rows
+    """Return rows (x, t, …) with every t (s) at every x (m): linear between the times of a place, constant outside."""
+    places, times = dict[float, list[Any]](), np.unique([row[1] for row in rows])
+    for row in sorted(rows):
+        places.setdefault(row[0], []).append(row[1:])
+    if min(len(places), len(times)) < 2 or len(rows) > len({row[:2] for row in rows}):
+        raise problem("", None, "must have at least two x and two t, and none of them together twice")
+    of_places = ((x, np.array(at).T) for x, at in places.items())
+    filled = ((x, np.array([np.interp(times, at[0], c) for c in at[1:]])) for x, at in of_places)
+    return tuple((x, float(t), *map(float, c)) for x, values in filled for t, c in zip(times, values.T, strict=True))
 
 
 #: Keys of which one says what a quantity is ↦ what its rows are over, and what checks these.
@@ -133,9 +138,10 @@ class Signal(SceneModel):
 
     def _check(self) -> None:
         keys = [name for name in OVER if name in type(self).model_fields]
-        given, harmonic = [name for name in keys if getattr(self, name) is not None], getattr(self, "harmonic", None)
-        if len(given) > 1 or not (given or harmonic):
-            added = "" if harmonic is None else "; harmonic may be given in addition"
+        given = [name for name in keys if getattr(self, name) is not None]
+        others = [name for name in ("harmonic", "gust") if name in type(self).model_fields]
+        if len(given) > 1 or not (given or any(getattr(self, name) for name in others)):
+            added = f"; {' and '.join(others)} may be given in addition" if others else ""
             raise problem("", ", ".join(given) or None, f"give exactly one of {', '.join(keys)}{added}")
 
     @property
@@ -171,6 +177,20 @@ class Harmonic(SceneModel):
             raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
 
 
+class Gust(SceneModel):
+    """One gust, ½ amplitude (1 − cos(2π (t − start)/duration)) while it lasts, else 0 (IEC 61400-1, without its dips).
+
+    Attributes:
+        amplitude: largest components, as those of a value; of a load over the span also rows (x, components).
+        duration: of the gust (s).
+        start: its begin (s).
+    """
+
+    amplitude: Any
+    duration: Annotated[Positive, unit("s")]
+    start: Annotated[Number, unit("s")] = 0.0
+
+
 class Harmonics(Signal):
     """A signal with harmonic parts.
 
@@ -180,9 +200,9 @@ class Harmonics(Signal):
 
     harmonic: Annotated[tuple[Harmonic, ...], LISTED] = ()
 
-    @field_validator("harmonic", mode="after")
+    @field_validator("harmonic", "gust", mode="after", check_fields=False)
     @classmethod
-    def _read_harmonics(cls, given: tuple[Harmonic, ...], info: ValidationInfo) -> tuple[Harmonic, ...]:
+    def _read_harmonics(cls, given: tuple[Any, ...], info: ValidationInfo) -> tuple[Any, ...]:
         out = []
         for i, part in enumerate(given):
             over = ("x",) if "over_span" in cls.model_fields and are_rows(part.amplitude) else ()
@@ -194,7 +214,7 @@ class Harmonics(Signal):
     def vectors(self) -> Iterator[tuple[float | None, tuple[float, ...]]]:
         """The same, with the amplitudes of harmonics."""
         yield from super().vectors
-        for h in self.harmonic:
+        for h in (*self.harmonic, *getattr(self, "gust", ())):
             spread = isinstance(h.amplitude[0], tuple)
             yield from ((row[0], row[1:]) for row in h.amplitude) if spread else [(None, h.amplitude)]
 
@@ -204,11 +224,13 @@ class LoadTable(Harmonics):
 
     Attributes:
         kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
+        gust: gusts, added to the rest, or alone.
     """
 
     UNIT: ClassVar[str] = "N"
 
     kind: Literal["dead", "follower"] = "dead"
+    gust: Annotated[tuple[Gust, ...], LISTED] = ()
 
 
 class MomentTable(LoadTable):
@@ -224,7 +246,8 @@ class SpanLoad(LoadTable):
     Attributes:
         over_span: rows (x, components), linear between them, no load outside, two of one x are a jump; or a function
             of the place; or None.
-        over_span_and_time: rows (x, t, components), every t at every x, or a function of place and time; or None.
+        over_span_and_time: rows (x, t, components), linear between the times of each x and constant outside, or a
+            function of place and time; or None.
     """
 
     UNIT: ClassVar[str] = "N/m"
@@ -249,8 +272,12 @@ class SpanLoad(LoadTable):
     def _check(self) -> None:
         super()._check()
         key, given = self.given
-        if "x" in OVER[key] and callable(given) and self.harmonic:
-            raise problem("harmonic", None, "cannot stand beside a function of the place, which can do the same")
+        if "x" in OVER[key] and callable(given) and (self.harmonic or self.gust):
+            raise problem(
+                "harmonic" if self.harmonic else "gust",
+                None,
+                "cannot stand beside a function of the place, which can do the same",
+            )
 
 
 class SpanMoment(SpanLoad):
@@ -386,10 +413,10 @@ def check_loads(structure: Any, motion: Any, loads: LoadsTable) -> None:
         if motion.is_free and per_rev is not None:
             why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
             raise problem(f"{key}.harmonic.per_rev", per_rev, why)
-    known = structure.thickness if structure.type == "plate" and isinstance(structure.thickness, dict) else {}
+    known = structure.regions if structure.type == "plate" else ()
     for name in () if loads.pressure is None else loads.pressure.regions or ():
         if name not in known:
-            has = f"there are {', '.join(known)}" if known else "structure.thickness must be by region"
+            has = f"there are {', '.join(known)}" if known else "nothing of structure is by region"
             raise problem(f"loads.pressure.regions.{name}", None, f"is no region of the plate; {has}")
 
 

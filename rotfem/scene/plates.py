@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy.typing as npt
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from rotfem.scene.files import existing_file
+from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
 from rotfem.scene.table import SceneModel, Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
@@ -18,22 +19,47 @@ from rotfem.scene.values import (
     PoissonRatio,
     Positive,
     ShearCorrection,
+    T,
     Tapered,
     Vector,
     check_on_span,
     check_profile_length,
+    check_span,
     check_start,
     evaluate,
 )
 
-#: A number, a taper (of a mesh from anywhere), or region ↦ number.
-Thickness = Annotated[
-    Annotated[Tapered[Positive], Tag("<profile>")] | Annotated[dict[str, Positive], Tag("<table>")],
-    Discriminator(lambda value: "<table>" if isinstance(value, dict) else "<profile>"),
+
+class Over(SceneModel):
+    """A table over the place.
+
+    Attributes:
+        over: "x", or "r", the distance from the origin of the plate.
+        table: rows (m, value), increasing; two rows of one place are a step.
+    """
+
+    over: Literal["x", "r"]
+    table: Annotated[tuple[tuple[Number, Positive], ...], FROM_FILE, AfterValidator(check_span)]
+
+
+def _shape(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "<over>" if "over" in value or "table" in value else "<table>"
+    if isinstance(value, Over):
+        return "<over>"
+    return "<function>" if callable(value) else "<profile>"
+
+
+#: A number, of a rectangle a taper along it, a table over the place, region ↦ number, or a function of (x, y).
+OverPlace = Annotated[
+    Annotated[Tapered[T], Tag("<profile>")]
+    | Annotated[dict[str, T], Tag("<table>")]
+    | Annotated[Over, Tag("<over>")]
+    | Annotated[Callable[[float, float], Any], Tag("<function>")],
+    Discriminator(_shape),
 ]
-
-
-Modulus = Annotated[Positive, unit("Pa")]
+Modulus = Annotated[OverPlace[Positive], along("Pa")]
+MATERIAL = ("E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho")
 
 
 def _as_edge(value: Any) -> Any:
@@ -80,7 +106,9 @@ class PlateStructure(StructureTable):
         mesh: path of a gmsh file with the physical surface "plate" and physical curves, or None.
         edges: named edge → how it is held. A rectangle has clamped, tip, lower and upper, a mesh its physical curves;
             one that is called "clamped" is clamped unless it is said otherwise, the others are free.
-        thickness: number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
+        thickness: of the plate (m): a number, or, as those of the material may, it varies over the place: a taper
+            ((x, value), …) of a rectangle, a table over "r" or "x", region → value of a mesh, in Python a function of
+            (x, y).
         E: Young's modulus (Pa), isotropic.
         nu: Poisson's ratio, isotropic.
         E1, E2: Young's moduli in directions 1 and 2 (Pa), orthotropic.
@@ -107,16 +135,16 @@ class PlateStructure(StructureTable):
     length: Annotated[Positive, unit("m")] | None = None
     width: Annotated[Positive, unit("m")] | None = None
     mesh: Annotated[str, BeforeValidator(lambda value, info: str(existing_file(value, info)))] | None = None
-    thickness: Annotated[Thickness, along("m")]
+    thickness: Annotated[OverPlace[Positive], along("m")]
     E: Modulus | None = None
-    nu: PoissonRatio | None = None
+    nu: OverPlace[PoissonRatio] | None = None
     E1: Modulus | None = None
     E2: Modulus | None = None
     nu12: Number | None = None
     G12: Modulus | None = None
     G13: Modulus | None = None
     G23: Modulus | None = None
-    rho: Annotated[NonNegative, unit("kg/m**3")]
+    rho: Annotated[OverPlace[NonNegative], along("kg/m**3")]
     shear_correction: ShearCorrection = 5.0 / 6.0
     hub_radius: Annotated[NonNegative, unit("m")] = 0.0
     hub_offset: Annotated[Vector, unit("m")] | None = None
@@ -157,26 +185,49 @@ class PlateStructure(StructureTable):
         """Whether the sections have rotary inertia; a plate of any thickness has."""
         return True
 
-    def thickness_at(self, x: npt.ArrayLike) -> Array:
-        """Return the thickness (m), which is not given by region, at coordinates x (m) along the plate, shape of x."""
-        return evaluate(self.thickness, x)
+    @property
+    def varying(self) -> dict[str, Any]:
+        """Thickness and constants of the material that vary over the place, by name."""
+        given = {name: getattr(self, name) for name in ("thickness", *MATERIAL)}
+        return {name: value for name, value in given.items() if value is not None and not isinstance(value, float)}
+
+    def at(self, name: str, places: npt.ArrayLike) -> Array:
+        """Return a property that is a table, at places along x, or distances from the origin (m), of their shape."""
+        value = getattr(self, name)
+        return evaluate(value.table if isinstance(value, Over) else value, places)
+
+    @property
+    def regions(self) -> tuple[str, ...]:
+        """Names of the regions of the mesh that a value is given for; none of a plate of one region."""
+        return next((tuple(value) for value in self.varying.values() if isinstance(value, dict)), ())
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Places x (m) of the rows of tables over x, increasing."""
+        tables = [v.table if isinstance(v, Over) and v.over == "x" else v for v in self.varying.values()]
+        return tuple(sorted({row[0] for table in tables if isinstance(table, tuple) for row in table}))
 
     def _check(self) -> None:
         geometry = self._way(self.WAYS)
-        material = self._way(self.MATERIALS)
+        self._way(self.MATERIALS)
         check_one_hub(self.hub_radius, self.hub_offset)
-        if isinstance(self.thickness, dict) and (geometry.name != "mesh" or not self.thickness):
-            raise problem("thickness", self.thickness, "thickness by region needs a mesh, and one for every region")
-        if isinstance(self.thickness, tuple) and self.length is not None:
-            with problems_at("thickness", self.thickness):
-                check_start(self.thickness)
-            check_profile_length("thickness", self.thickness, self.length)
+        for name, value in self.varying.items():
+            if isinstance(value, dict) and (geometry.name != "mesh" or set(value) != set(self.regions) or not value):
+                raise problem(name, value, "by region it needs a mesh, and a value for every one")
+            if not isinstance(value, tuple):
+                continue
+            if self.length is None:
+                raise problem(name, value, 'say what the table of a mesh is over: { over = "r", table = … }, or "x"')
+            with problems_at(name, value):
+                check_start(value)
+            check_profile_length(name, value, self.length)
         for key in ("point_masses", "point_supports"):
             for i, (x, _, _) in enumerate(getattr(self, key)):
                 check_on_span(f"{key}.{i}.0", x, self.length)
-        if material.name == "orthotropic" and self.E1 is not None and self.E2 is not None and self.nu12 is not None:
-            limit = math.sqrt(self.E1 / self.E2)
-            if abs(self.nu12) >= limit:
+        E1, E2, nu12 = self.E1, self.E2, self.nu12
+        if isinstance(E1, float) and isinstance(E2, float) and isinstance(nu12, float):
+            limit = math.sqrt(E1 / E2)
+            if abs(nu12) >= limit:
                 raise problem("nu12", self.nu12, f"must be less than √(E1/E2) = {limit:g} in size, else not stable")
 
     def _way(self, ways: tuple[Way, ...]) -> Way:

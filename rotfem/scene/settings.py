@@ -214,6 +214,12 @@ def usual(given: Mapping[str, Any]) -> str:
 Seconds = Annotated[Positive, unit("s")]
 
 
+#: What a history without steps lacks.
+NO_STEPS = (
+    "missing: give step (fixed steps, s), tolerance (adaptive steps), or accuracy = 1e-3 beside [time], which finds it"
+)
+
+
 class Time(WithParameters):
     """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
@@ -260,9 +266,8 @@ class Time(WithParameters):
         self._check_steps()
 
     def _check_steps(self) -> None:
-        if (self.step is None) == (self.tolerance is None):
-            reason = "give step (fixed steps, s) or tolerance (adaptive steps), or neither, and the scene an accuracy"
-            raise problem("step", self.step, reason)
+        if self.step is not None and self.tolerance is not None:
+            raise problem("step", self.step, "give step (fixed steps, s) or tolerance (adaptive steps), not both")
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
         if self.output_step is not None and self.output_every != 1:

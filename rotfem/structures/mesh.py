@@ -87,15 +87,13 @@ def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
     data = problem.structure
     if data.mesh is None:
         return rectangle(data, problem.mesh, comm, problem.loads.stations)
-    wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
-    return from_file(Path(data.mesh), wanted, tuple(data.holds), () if data.edges else CLAMP, comm)
+    return from_file(Path(data.mesh), data.regions, tuple(data.holds), () if data.edges else CLAMP, comm)
 
 
 def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] = ()) -> PlateGrid:
     """Return 0 ≤ x ≤ length, |y| ≤ width/2 in even cells, with lines at knots of thickness and loads (m)."""
     cell = mesh.CellType.quadrilateral if grid.cell == "quadrilateral" else mesh.CellType.triangle
-    knots = tuple(x for x, _ in data.thickness[1:-1]) if isinstance(data.thickness, tuple) else ()
-    lines = beam_nodes(data.length, grid.elements[0], apart((*knots, *stations), data.length))
+    lines = beam_nodes(data.length, grid.elements[0], apart((*data.knots, *stations), data.length))
     half = data.width / 2
     corners = [np.array([0.0, -half]), np.array([data.length, half])]
     cells = (len(lines) - 1, grid.elements[1])
@@ -209,7 +207,7 @@ def _check_names(groups: Groups, surfaces: Sequence[str], needed: Sequence[str])
                 why = ", and structure.edges names none that holds it" * (dimension == 1)
                 raise BadMesh(f'has no physical {kind} "{name}" (physical {kind}s: {named}){why}')
     for name in (*groups[3], *(groups[2].keys() - set(surfaces))):
-        raise BadMesh(f'its physical group "{name}" is of dimension 3, or no region of structure.thickness or "plate"')
+        raise BadMesh(f'its physical group "{name}" is of dimension 3, or no region of structure or "plate"')
 
 
 def _elements(gmsh: Any, dimension: int, name: str, tag: int) -> tuple[int, Integers]:

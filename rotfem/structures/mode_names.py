@@ -26,8 +26,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-#: Family of the bending of a beam ↦ its word in names of a blade, and of another beam that an axis across it turns.
-WORDS = {"flap": ("flapwise", "out-of-plane"), "lag": ("edgewise", "in-plane")}
+#: Family of a beam's bending ↦ its word for a blade, and for others that turn about direction 3, or 2.
+WORDS = {"flap": ("flapwise", "out-of-plane", "in-plane"), "lag": ("edgewise", "in-plane", "out-of-plane")}
 
 
 class ModeName(NamedTuple):

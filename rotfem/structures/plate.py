@@ -35,6 +35,7 @@ from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.section_fields import field_values
 from rotfem.structures.structure import Array, PointValues, Structure, check_memory
+from rotfem.users_functions import number_of
 
 
 def plate_points(plate: Structure) -> Points:
@@ -71,24 +72,45 @@ class EdgeMoment(AppliedLoad):
         return e - ufl.dot(e, self.director) * self.director
 
 
-def constants(data: Any) -> dict[str, float]:
-    """Return name ↦ value of the material: moduli (Pa), Poisson's ratio, density (kg/m³), shear correction."""
+def properties(data: Any) -> dict[str, Any]:
+    """Return name ↦ value of thickness (m), moduli (Pa), Poisson's ratio, density (kg/m³), and shear correction."""
     names = ("E1", "E2", "nu12", "G12", "G13", "G23") if data.is_orthotropic else ("E", "nu")
-    values: dict[str, Any] = {name: getattr(data, name) for name in (*names, "rho", "shear_correction")}
+    values: dict[str, Any] = {name: getattr(data, name) for name in ("thickness", *names, "rho", "shear_correction")}
     return {name: values["G12"] if value is None else value for name, value in values.items()}
 
 
-def thickness_field(data: Any, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
-    """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines."""
-    if isinstance(data.thickness, dict):
-        h = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name="thickness")
-        for name, value in data.thickness.items():
-            h.x.array[grid.regions.find(grid.region_names[name])] = value
-        h.x.scatter_forward()
-        return h
-    h = fem.Function(fem.functionspace(grid.mesh, ("DG", degree if len(rows) else 1)), name="thickness")
-    h.x.array[:] = field_values(lambda x, _: data.thickness_at(x), rows, degree, h.function_space, positive).ravel()
-    return h
+def over_place(data: Any, name: str, grid: PlateGrid, rows: Array, degree: int) -> fem.Function:
+    """Return a property that varies: by region, along x (see `section_fields`), over r, or as a function says.
+
+    What varies over r, or by a function, is that at the nodes of a field of the degree of the unknowns in each cell.
+    """
+    value = getattr(data, name)
+    if isinstance(value, dict):
+        f = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name=name)
+        for region, number in value.items():
+            f.x.array[grid.regions.find(grid.region_names[region])] = number
+        f.x.scatter_forward()
+        return f
+    if not callable(value) and getattr(value, "over", "x") == "x":
+        f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree if len(rows) else 1)), name=name)
+        space, at = f.function_space, lambda x, near: data.at(name, x + ONE * (near - x))
+        f.x.array[:] = field_values(at, rows, degree, space, positive).ravel()
+        return f
+    f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree)), name=name)
+    x, cells = f.function_space.tabulate_dof_coordinates(), f.function_space.dofmap.list
+    if callable(value):
+        given = number_of(value, f"structure.{name}", name)
+        f.x.array[:] = [given(*map(float, point[:2])) for point in x]
+    else:
+        middle = np.empty_like(x)
+        middle[cells] = x[cells].mean(axis=1)[:, None]
+        f.x.array[:] = data.at(name, np.linalg.norm(x + ONE * (middle - x), axis=1))
+    if len(bad := np.flatnonzero(f.x.array <= 0.0)) and not name.startswith("nu"):
+        at = x[bad[0]]
+        raise InputError(
+            f"structure.{name}", float(f.x.array[bad[0]]), f"must be greater than 0, as at {at[0]:g}, {at[1]:g}"
+        )
+    return f
 
 
 def positive(values: Array) -> bool:
@@ -161,8 +183,7 @@ class Plate(Structure):
             raise InputError("mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
         if s.mesh is not None:  # whose lines are where they are
-            thick = [x for x, _ in s.thickness] if isinstance(s.thickness, tuple) else []
-            self.inner_rows = np.unique([*thick, *problem.loads.stations])
+            self.inner_rows = np.unique([*s.knots, *problem.loads.stations])
         self.check_shared()
         self.points = plate_points(self)
         subdomains = self.points.subdomains
@@ -172,12 +193,13 @@ class Plate(Structure):
         self._hold()
         low, high = self._box()
         self.length = float(np.max(high - low))
-        thick = np.max([*s.thickness.values()] if isinstance(s.thickness, dict) else s.thickness_at(0.0))
-        self.radius = float(thick) / math.sqrt(12.0)
         self._has_tip = "tip" in self.grid.curve_names
         self.tip = self.grid.along("tip") if self._has_tip else None
         self.tip_values = PointValues(self.V, self._tip_point(low, high))
         self._properties()
+        h = self.section["thickness"]
+        thickest = np.max(h.value if isinstance(h, fem.Constant) else h.x.array, initial=0.0)
+        self.radius = float(comm.allreduce(float(thickest), MPI.MAX)) / math.sqrt(12.0)
         self.turns = DirectorTurns.of(self) if self.size == len(self.components) else None
 
     @classmethod
@@ -292,11 +314,13 @@ class Plate(Structure):
 
     def _properties(self) -> None:
         """Make the constants and fields of thickness and material, and of the hub."""
-        s = self.data
-        degree, uniform = self.V.element.basix_element.degree, isinstance(s.thickness, float)
-        h = self.constant(s.thickness) if uniform else thickness_field(s, self.grid, self.inner_rows, degree)
-        self.section["thickness"] = h
-        self.section |= {name: self.constant(value) for name, value in constants(s).items()}
+        s, degree = self.data, self.V.element.basix_element.degree
+        for name, value in properties(s).items():
+            key = name if getattr(s, name) is not None else "G12"
+            uniform = isinstance(value, float)
+            self.section[name] = (
+                self.constant(value) if uniform else over_place(s, key, self.grid, self.inner_rows, degree)
+            )
         names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")
         root = zip(names_of, s.root_position, strict=True)
         self._root = [self.scalar(name, c) if c != 0.0 or name == "hub_radius" else 0 for name, c in root]
@@ -470,11 +494,34 @@ class Plate(Structure):
 
     @property
     def doubt(self) -> str:
-        """What is said of a plate that is nearly round; "" of others."""
-        if not ROUND < self._outline.off <= NEARLY:
+        """What is said of a plate that is nearly round, or of fibres far stiffer than what joins them; "" of others."""
+        if ROUND < self._outline.off <= NEARLY:
+            off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
+            return (
+                f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+            )
+        uniform = all(isinstance(getattr(self.data, name), float) for name in ("E1", "E2", "G12", "rho"))
+        return self._of_strips() if uniform else ""
+
+    def _of_strips(self) -> str:
+        """Return which modes in the plane the mesh has no waves for; "" of most materials.
+
+        Strips along the fibres, x, bend against each other without shear, u_2 = f(x) G,y and u_1 = −f,x G. With
+        ∫ f,xx² = k⁴ ∫ f² their G has E_2 G,yyyy + ρ ω² G,yy + E_1 k⁴ G = 0. At a free edge, where it dies away in waves
+        of 2π (E_2/E_1)^¼/k, ρ ω² is k² √(E_1 E_2). A cantilever's first k is 1.8751/L.
+        """
+        s, across = self.data, int(self.data.E1 >= self.data.E2)
+        low, high = self._box()
+        k, E = 1.8751 / float(high[1 - across] - low[1 - across]), float(np.sqrt(s.E1 * s.E2))
+        wave = 2 * np.pi / k * (min(s.E1, s.E2) / max(s.E1, s.E2)) ** 0.25
+        x = self.mesh.geometry.x[self.mesh.geometry.dofmap, across]
+        widest = self.comm.allreduce(float(np.ptp(x, axis=1).max(initial=0.0)), op=MPI.MAX)
+        if s.G12 < E or wave > 2 * widest:
             return ""
-        off = f"its outline is {100 * self._outline.off:.2g} % off round, more than {100 * ROUND:g} %"
-        return f"the plate is nearly a disk, but {off}: its modes are named as a plate's, without synchronous speeds"
+        return (
+            f"coarse: from about {k * np.sqrt(E / s.rho):.3g} rad/s on strips along fibres bend in the plane, in "
+            f"waves of {wave:.2g} m across them, which cells of {widest:.2g} m do not have"
+        )
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode by its nodal lines, circles or diameters (see `plate_mode_name`)."""

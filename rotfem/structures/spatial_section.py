@@ -72,7 +72,7 @@ def moving_moments(masses: Array) -> tuple[list[tuple[int, int]], bool]:
     An entry is left out where it vanishes in all mass matrices (n, 6, 6). Those on the diagonal come first.
     """
     m = masses[:, 0, 0]
-    c = np.stack([masses[:, 1, 5], masses[:, 2, 3], masses[:, 0, 4]], axis=-1) / m[:, None]
+    c = np.stack([masses[:, 1, 5], masses[:, 2, 3], masses[:, 0, 4]], axis=-1) / np.where(m > 0.0, m, 1.0)[:, None]
     J = masses[:, 3:, 3:] - m[:, None, None] * (
         np.einsum("nk,nk->n", c, c)[:, None, None] * np.eye(3) - np.einsum("ni,nj->nij", c, c)
     )
@@ -163,7 +163,9 @@ class SectionForms:
             valid = positive_matrices(definite=name == "stiffness")
             f = beam.linear_field(name, lambda x: self._data.at(x)[name][:, rows, columns], len(upper), valid)
             beam.section[name] = f
-            entries = {ij: f[n] for n, ij in enumerate(upper)}
+            there = self._data.at(self._data.knots)[name]  # where there is no mass, its centre is 0, not 0/0
+            kept = [ij for ij in upper if name != "mass" or ij == (0, 0) or np.any(there[:, *ij])]
+            entries = {ij: f[upper.index(ij)] for ij in kept}
         else:
             for (i, j), value in zip(upper, np.array(getattr(self._data, name))[np.triu_indices(6)], strict=True):
                 if value != 0.0:

@@ -251,6 +251,8 @@ class Structure:
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
         self.load_constants: dict[str, Amplitude] = {}
+        #: Family ↦ its word in names of modes, where that is another one.
+        self.words: dict[str, str] = {}
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
         self.size = len(self.active) + len(self.extra)
@@ -533,13 +535,14 @@ class Structure:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
 
-    def word(self, family: str) -> str:
-        """Return what a family is called in names of modes."""
-        return family
-
     def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
-        """Return whether a shape at the nodes (n, components) is a motion of a rigid body, as far as known."""
-        return False
+        """Return whether a shape (n, components) is that of a rigid body, but for 0.5 % of its largest displacement."""
+        places, (u, turns) = self.places(coordinates), np.zeros((2, len(values), 3), dtype=complex)
+        u[:, : np.sum(self.moves)] = values[:, self.moves]
+        for axis, component in self.turns_of.items():
+            turns[:, axis - 1] = values[:, component]
+        strained = u - u[0] - np.cross(turns[0], places - places[0]), self.length * (turns - turns[0])
+        return bool(np.max(np.abs(strained)) <= 5e-3 * max(np.max(np.abs(u)), self.length * np.max(np.abs(turns))))
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode of a family, from its complex shape at the nodes (n, components)."""

@@ -45,6 +45,8 @@ end = 0.02
 step = 1e-3
 [initial]
 state = "undeformed"
+[output]
+error = false
 """
 
 

@@ -29,7 +29,6 @@ TIME = "[time]\nend = 0.01\nstep = 0.005\n"
 #: Meshes of fewer cells than processes: name ↦ number of processes, shape, mesh, and the key that is to blame.
 FEW = {
     "one cell": (2, "length = 1.0\nwidth = 0.6", "elements = [1, 1]", "mesh.elements = [1, 1]: "),
-    "three cells": (4, "length = 1.0\nwidth = 0.6", "elements = [3, 1]", "mesh.elements = [3, 1]: "),
     "a file of one cell": (2, 'mesh = "one.msh"', "", 'structure.mesh = "one.msh": '),
 }
 
@@ -60,7 +59,7 @@ def test_any_failure_of_the_reader_is_told_by_all(tmp_path: Path) -> None:
     refused(tmp_path, 2, "modes", "good.toml", broken="gmsh.option.setNumber", parts=[message])
 
 
-@pytest.mark.parametrize(("name", "command"), zip(FEW, ("modes", "run", "modes"), strict=True))
+@pytest.mark.parametrize(("name", "command"), zip(FEW, ("modes", "run"), strict=True))
 def test_more_processes_than_cells(tmp_path: Path, name: str, command: str) -> None:
     ranks, shape, mesh, key = FEW[name]
     write_msh(tmp_path / "one.msh", *grid(1, 1))

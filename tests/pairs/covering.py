@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations, product
@@ -25,7 +26,9 @@ def completed(chosen: Row, levels: Levels, conflicts: Sequence[Levels]) -> Row |
     return next((row for row in tries if row is not None), None)
 
 
-def covering(strength: int, weights: Weights, active: Levels, conflicts: Sequence[Levels], seed: int) -> Iterator[Row]:
+def covering(
+    strength: int, weights: Weights, active: Levels, conflicts: Sequence[Levels], dear: Sequence[str], seed: int
+) -> Iterator[Row]:
     """Yield rows until every set of so many choices that can occur has: greedily, the best of some random rows.
 
     Args:
@@ -33,9 +36,13 @@ def covering(strength: int, weights: Weights, active: Levels, conflicts: Sequenc
         weights: all levels.
         active: command ↦ factors that it makes use of; a set of choices counts only where all of its have a use.
         conflicts: what no row may have.
+        dear: factors whose levels of little weight make a row so dear that it must cover more.
         seed: of the random numbers.
     """
     rng = random.Random(seed)
+
+    def quickness(row: Row) -> float:
+        return math.prod(weights[factor][row[factor]] for factor in dear) ** 0.3
 
     def shuffled() -> Levels:
         return {f: sorted(levels, key=lambda level: rng.expovariate(levels[level])) for f, levels in weights.items()}
@@ -49,9 +56,9 @@ def covering(strength: int, weights: Weights, active: Levels, conflicts: Sequenc
             continue
         factors = {factor for factor, _ in wanted}
         idle = {"command": [command for command, used in active.items() if not factors <= {*used}]}
-        rows = (completed(dict(wanted), shuffled(), [*conflicts, idle]) for _ in range(40))
+        rows = (completed(dict(wanted), shuffled(), [*conflicts, idle]) for _ in range(200 // strength))
         found = [(row, left & sets_of(row, strength, active)) for row in rows if row is not None]
-        row, new = max(found, key=lambda pair: len(pair[1]), default=(None, {wanted}))
+        row, new = max(found, key=lambda pair: len(pair[1]) * quickness(pair[0]), default=(None, {wanted}))
         left -= new
         if row is not None:
             yield row

@@ -34,7 +34,7 @@ ALONE: list[tuple[Row, dict[str, Any]]] = []
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "row" in metafunc.fixturenames:
         nightly = "nightly" in str(metafunc.config.option.markexpr)
-        rows = covering(3 if nightly else 2, LEVELS, ACTIVE, CONFLICTS, seed=1)
+        rows = covering(3 if nightly else 2, LEVELS, ACTIVE, CONFLICTS, ("structure", "theory"), seed=1)
         marks = [pytest.mark.nightly] if nightly else []
         metafunc.parametrize("row", [pytest.param(row, id="-".join(row.values()), marks=marks) for row in rows])
 

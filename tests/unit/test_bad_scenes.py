@@ -75,7 +75,7 @@ mesh.elements=2.0 -> integer
 mesh.elements=[2,2] -> integer
 mesh.degree=7 -> at most 6
 mesh.cell='triangle' -> unknown key
-time={end=1.0} -> @time.step give step
+time={end=1.0, step=0.1, tolerance=1e-4} -> @time.step not both
 time={step=0.1} -> @time.end required key is missing
 time={end=1.0, step=0} -> @time.step greater than 0
 time={end=1.0, step=2} -> @time.step at most time.end
@@ -108,7 +108,9 @@ loads={distributed={over_span=[[0,0,0],[11,0,1]]}} -> @loads.distributed.over_sp
 loads={distributed={over_span=[[0,0],[10,1]]}} -> row 1 has 2 entries
 loads={distributed={over_span=[[0,0,0],[5,0,1]], value=[0,1]}} -> exactly one of
 loads={distributed={over_span=[[0,0,0],[5,0,1],[4,0,1]]}} -> row 3: 4 < 5
-loads={distributed={over_span_and_time=[[0,0,0,1],[5,0,0,1],[0,1,0,1]]}} -> every t at every x
+loads={distributed={over_span_and_time=[[0,0,0,1],[5,0,0,1],[5,0,0,1]]}} -> at least two x and two t
+loads={tip_force={gust={amplitude=[0,1]}}} -> @loads.tip_force.gust.0.duration missing
+loads={distributed={value=[0,1], gust={amplitude=1, duration=1}}} -> @loads.distributed.gust.0.amplitude must be
 loads={distributed={over_span=[[0,0,0,1],[5,0,0,1]]}} -> third component
 loads={tip_force={over_span=[[0,0,0],[5,0,1]]}} -> unknown key
 loads={pressure=1.0} -> needs a plate

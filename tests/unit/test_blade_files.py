@@ -12,7 +12,6 @@ import yaml
 
 import rotfem
 from rotfem.commands.fields import axes_along
-from rotfem.commands.import_blade import write_imported
 from rotfem.scene import Scene, load_scene
 from tests import blade_decks as decks
 from tests import blade_main_decks as mains
@@ -28,6 +27,35 @@ def test_elastodyn(tmp_path: Path) -> None:
     np.testing.assert_allclose([v for _, v in section.EI3], [0.9 * s["EI3"] for s in decks.STATIONS])
     np.testing.assert_allclose(beam.pretwist, [[0.0, -np.radians(12.0)], [20.0, np.radians(1.5)]])
     assert section.EA == 1e12
+
+
+def test_rigid_is_what_a_file_leaves_open(tmp_path: Path) -> None:
+    """Bending alone is left: frequencies are those with other large stiffnesses; of a file, what it has stays."""
+    (tmp_path / "blade.dat").write_text(decks.elastodyn())
+    with pytest.raises(rotfem.SceneError, match=r"must have EA, GA2, GA3, GJ, or rigid = true \(import --rigid\)"):
+        rotfem.import_blade(tmp_path / "blade.dat", changes=["structure.length=20"])
+    scene = rotfem.import_blade(tmp_path / "blade.dat", changes=["structure.length=20", "modes.count=3"], rigid=True)
+    assert scene.hints[0].startswith("blade.dat: rigid: EA = ")
+    assert scene.output.frequency == "Hz"
+    more = scene.replace({f"structure.section.{key}": 30.0 * getattr(scene.structure.section, key) for key in STIFF})
+    one, other = (rotfem.modes(s, error=False).frequencies for s in (scene, more))
+    np.testing.assert_allclose(one, other, rtol=1e-5)
+
+
+def test_a_static_file_without_mass(tmp_path: Path) -> None:
+    """Its deflection under a force is that of the blade with its mass."""
+    heavy = decks.beamdyn_blade()
+    numbers = iter(range(10**6))
+    light = "\n".join(
+        "0 0 0 0 0 0" if len(line.split()) == 6 and "e+" in line and next(numbers) % 12 >= 6 else line
+        for line in heavy.split("\n")
+    )
+    tips = []
+    for text in (heavy, light):
+        (tmp_path / "blade.dat").write_text(text)
+        scene = rotfem.import_blade(tmp_path / "blade.dat", changes=["structure.length=20"], rigid=True)
+        tips.append(rotfem.run(scene.replace({"loads.tip_force": [0, 0, 1e4]}), error=False).tip["u3"][-1])
+    assert tips[1] == pytest.approx(tips[0], rel=1e-9)
 
 
 def test_columns_that_fast_shared_with_adams(tmp_path: Path) -> None:
@@ -146,7 +174,7 @@ beamdyn.dat length | 2   station => two   station | line 4, column 1: station_to
 beamdyn.dat |  | BeamDyn's primary file has the line
 bmodes.dat length stiff | 2  n_secs => 1  n_secs | line 2, column 1: n_secs
 bmodes.dat length stiff | tc_offst => te_offst | line 4, column 13: the column "te_offst" is not known
-bmodes.dat length stiff | 3.000000000000e+02 => 0.0 | section.mass_per_length.0.1 = 0.0: must be greater
+bmodes.dat length stiff | 3.000000000000e+02 => -1.0 | section.mass_per_length.0.1 = -1.0: must be
 bmodes.dat length stiff | 1.000000000000e+00 => 0.5 | sec_loc must rise from 0 to 1
 bmodes.dat length stiff | 1.200000000000e+01  1.2 => 1.2e+01  1.3 | line 6: tw_iner must be
 bmodes.dat length |  | structure.section: must have GA2, GA3
@@ -482,8 +510,8 @@ def test_import_writes_a_scene_that_is_the_blade(tmp_path: Path) -> None:
     (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
     (tmp_path / "primary.dat").write_text(mains.beamdyn_primary(PRIMARY))
     scene = rotfem.import_blade(tmp_path / "primary.dat", changes=["structure.tip_mass=3.0", "motion.speed=1.2"])
-    write_imported(scene, tmp_path / "primary.dat", tmp_path / "out.toml")
+    scene.write(tmp_path / "out.toml", "# imported\n")
     again = rotfem.load_scene(tmp_path / "out.toml")
     assert again.structure == scene.structure == read(tmp_path, "primary.dat", structure_tip_mass=3.0)
-    assert (tmp_path / "out.toml").read_text().startswith("# imported from primary.dat;")
+    assert (tmp_path / "out.toml").read_text().startswith("# imported\n")
     assert again.motion.speed == 1.2

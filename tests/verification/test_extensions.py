@@ -74,14 +74,6 @@ def test_theory(extension: Callable[[str], ModuleType]) -> None:
     assert 0.0 < np.max(np.abs(own - other)) <= (size / 10.0) ** 2 * size
 
 
-def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str], ModuleType]) -> None:
-    extension("half_square_theory")
-    plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
-    tables = {"structure": plate, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "half_square"}}
-    with pytest.raises(SceneError, match="has strains for planar_beam, none for a plate"):
-        rotfem.Problem.of(tables)
-
-
 # --- an effect --------------------------------------------------------------------------------------------------------
 
 
@@ -156,12 +148,6 @@ def test_a_scheme_of_fifth_order_with_coupled_stages(extension: Callable[[str], 
         last.append(rotfem.run({**tables, "time": time}).history["tip_u2"])
     change = [np.max(np.abs(b - a)) for a, b in pairwise(last)]
     assert np.log2(change[-2] / change[-1]) > 4.6
-
-
-def test_scheme_without_an_error_estimate_has_no_adaptive_steps(extension: Callable[[str], ModuleType]) -> None:
-    extension("bdf2")
-    with pytest.raises(SceneError, match=r"time\.(tolerance|scheme)"):
-        beam({"time": {"end": 1.0, "tolerance": 1e-3, "scheme": "bdf2"}})
 
 
 # --- a section --------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ STILL, SPIN = {"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 
 Q = 3.0
 TRIANGLE = [[0, 0, 0], [L, 0, Q]]
 TIME = {"end": 0.4, "step": 0.01}
+TIMES = np.linspace(0.0, 0.4, 401).tolist()
 
 
 def computed(loads: Any, theory: str = "reissner", motion: Any = STILL, **more: Any) -> Any:
@@ -114,3 +115,32 @@ def test_one_load_in_many_ways(case: str, theory: str) -> None:
     allowed = 1e-3 if case == "ramp" else 1e-7
     for tip in tips[1:]:
         np.testing.assert_allclose(tip, tips[0], rtol=0, atol=allowed * size)
+
+
+def test_a_gust_is_one_minus_cosine() -> None:
+    """It is the function ½ a (1 − cos 2π(t − t₀)/T) of its parameters, added to what else there is."""
+    start, duration = 0.1, 0.2
+
+    def gust(t: float) -> list[float]:
+        part = min(max((t - start) / duration, 0.0), 1.0)
+        return [0.0, 4.0 + 10.0 * (1.0 - np.cos(2 * np.pi * part))]
+
+    said = {"value": [0, 4], "gust": {"amplitude": [0, "20 N"], "duration": "200 ms", "start": start}}
+    one, other = (computed({"tip_force": load}, time=TIME) for load in (said, gust))
+    np.testing.assert_allclose(one.tip["u2"], other.tip["u2"], atol=1e-9 * np.max(np.abs(other.tip["u2"])))
+    spread = {"gust": {"amplitude": [[0, 0, 0], [L, 0, Q]], "duration": duration}}
+    there = computed({"distributed": spread}, "linear", time=TIME)
+    table = [[t, *(0.5 * (1 - np.cos(2 * np.pi * min(t / duration, 1.0))) * np.array([0, Q]))] for t in TIMES]
+    rows = [[x, t, a * x / L, b * x / L] for x in (0.0, L) for t, a, b in table]
+    by_rows = computed({"distributed": {"over_span_and_time": rows}}, "linear", time=TIME)
+    np.testing.assert_allclose(there.tip["u2"], by_rows.tip["u2"], atol=1e-4 * np.max(np.abs(by_rows.tip["u2"])))
+
+
+def test_places_of_a_table_have_times_of_their_own() -> None:
+    """What is linear between the times of a place, and constant outside, is the table with all times at all places."""
+    few = [[0, 0, 0, 0], [0, 0.4, 0, 8], [5, 0.1, 0, 1], [5, 0.2, 0, 3], [L, 0.3, 0, 2]]
+    at = {0.0: lambda t: 20 * t, 5.0: lambda t: 1 + 20 * min(max(t - 0.1, 0.0), 0.1), L: lambda t: 2.0}
+    times = (0.0, 0.1, 0.2, 0.3, 0.4)
+    all_of_them = [[x, t, 0.0, f(t)] for x, f in at.items() for t in times]
+    one, other = (computed({"distributed": {"over_span_and_time": r}}, "linear", time=TIME) for r in (few, all_of_them))
+    np.testing.assert_allclose(one.tip["u2"], other.tip["u2"], rtol=1e-10, atol=1e-12)

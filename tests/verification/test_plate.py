@@ -674,3 +674,16 @@ def test_a_mesh_does_not_make_an_instability(cells: int) -> None:
     rows = {row["label"].split(" ")[1]: row["frequency"] / 10.0 for row in found.rows}
     assert rows["bending"] == pytest.approx(1.0, rel=1e-3)
     assert rows["torsion"] == pytest.approx(np.sqrt(2.0), rel=0.06)
+
+
+@pytest.mark.parametrize(("cells", "shown"), [(8, False), (64, True)])
+def test_fibres_that_nothing_joins(cells: int, shown: bool) -> None:
+    """Strips along fibres bend in the plane, ρ ω² = √(E_1 E_2) (1.8751/L)²: they are there, or said to be missing."""
+    moduli = {"E1": 1.2e7, "E2": 0.12, "nu12": 0.0, "G12": 1.2e7, "rho": 100.0}
+    structure = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, **moduli}
+    tables = {"structure": structure, "motion": {"type": "constant", "speed": 0.0}, "modes": {"count": 3}}
+    found = rotfem.modes({**tables, "mesh": {"elements": [8, cells]}, "output": {"error": False}})
+    assert ("in-plane" in found.labels[1]) == shown
+    assert any("from about 6.5 rad/s" in warning for warning in found.warnings) != shown
+    if shown:
+        assert found.frequencies[1] == pytest.approx(1.8751 * np.sqrt(12.0), rel=2e-2)

@@ -1,4 +1,4 @@
-"""Edges of plates: squares and disks held in several ways, against classical frequencies, and what is refused.
+"""Edges and tapers of plates: squares and disks, against classical frequencies, and what is refused.
 
 ω a² √(ρh/D) of squares, ν = 0.3. Thin: simply supported all round (m² + n²) π² (Navier); clamped, cantilever and two
 opposite edges simply supported: Leissa, "The free vibration of rectangular plates", Journal of Sound and Vibration 31
@@ -66,19 +66,22 @@ def test_a_quarter_with_two_planes_of_symmetry_is_the_whole() -> None:
     np.testing.assert_allclose(4 * frequencies(plate(0.001, quarter)), expected, rtol=1e-3)
 
 
-def write(path: Path, turn: float | None = None) -> Path:
-    """Write a square with the edges a to d, turned by an angle (rad), or the unit disk with the edge "rim"."""
+def write(path: Path, turn: float | None = None, inner: float = 0.0, size: float = 0.17, radius: float = 1.0) -> Path:
+    """Write a square with the edges a to d, turned by an angle (rad), or a disk with the edges "rim" and "hole"."""
     gmsh.initialize([], False, False, False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         model, occ = gmsh.model, gmsh.model.occ
-        face = occ.addDisk(0, 0, 0, 1, 1) if turn is None else occ.addRectangle(0, 0, 0, 1, 1)
+        face = occ.addDisk(0, 0, 0, radius, radius) if turn is None else occ.addRectangle(0, 0, 0, 1, 1)
+        if inner:
+            occ.cut([(2, face)], [(2, occ.addDisk(0, 0, 0, inner, inner))])
         occ.rotate([(2, face)], 0, 0, 0, 0, 0, 1, turn or 0.0)
         occ.synchronize()
         for name, (_, curve) in zip("abcd", model.getBoundary([(2, face)]), strict=False):
-            model.addPhysicalGroup(1, [abs(curve)], name="rim" if turn is None else name)
+            round_edge = "rim" if model.getBoundingBox(1, abs(curve))[3] > 0.9 * radius else "hole"
+            model.addPhysicalGroup(1, [abs(curve)], name=round_edge if turn is None else name)
         model.addPhysicalGroup(2, [face], name="plate")
-        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.17)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
         model.mesh.generate(2)
         gmsh.write(str(path))
@@ -137,3 +140,52 @@ def test_bad_edges_are_named(edges: dict[str, Any], said: str) -> None:
     with pytest.raises(rotfem.SceneError) as error:
         rotfem.modes(plate(0.01, edges))
     assert said.replace('"', "") in str(error.value).replace('"', "")
+
+
+# --- tapers -----------------------------------------------------------------------------------------------------------
+
+#: Frequencies (Hz) of a steel disk of 0.05 and 0.25 m, clamped inside, 12 mm thick there and 4 mm at the rim, at 900
+#: rad/s, from a converged Ritz solution of the thin ring with its prestress.
+TAPERED = [301.92, 305.66, 305.66, 353.89, 353.89, 489.64]
+
+
+@pytest.mark.parametrize("way", ["over r", "function", "file"])
+def test_a_taper_over_the_radius_needs_no_rings(tmp_path: Path, way: str) -> None:
+    (tmp_path / "taper.csv").write_text("0.05,12e-3\n0.25,4e-3\n")
+    thickness: Any = {
+        "over r": {"over": "r", "table": [[0.05, "12 mm"], [0.25, "4 mm"]]},
+        "file": {"over": "r", "table": str(tmp_path / "taper.csv")},
+        "function": lambda x, y: 12e-3 - 8e-3 * (math.hypot(x, y) - 0.05) / 0.2,
+    }[way]
+    mesh = str(write(tmp_path / "ring.msh", inner=0.05, size=0.03, radius=0.25))
+    scene = plate(1.0, {"hole": "clamped"}, mesh=mesh, E=210e9, rho=7850.0) | {"modes": {"count": 6}}
+    scene["structure"]["thickness"], scene["motion"]["speed"] = thickness, 900.0
+    np.testing.assert_allclose(rotfem.modes(scene).frequencies_hz, TAPERED, rtol=1e-3)
+
+
+def test_a_material_over_the_place_is_that_of_the_middle_where_it_does_not_change() -> None:
+    same = plate(0.01, {}) | {"mesh": {"elements": [4, 4], "degree": 2}}
+    varying = {
+        "E": {"over": "x", "table": [[0, 1e9], [0.5, 1e9], [1, 1e9]]},
+        "rho": lambda x, y: 1000.0,
+        "nu": [[0, 0.3], [1, 0.3]],
+    }
+    other = same | {"structure": same["structure"] | varying}
+    found = [rotfem.modes({**scene, "modes": {"count": 3}}).frequencies for scene in (same, other)]
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "said"),
+    [
+        ([[0.0, 0.01], [1.0, 0.02]], "say what the table of a mesh is over"),
+        ({"over": "z", "table": [[0.0, 0.01], [1.0, 0.02]]}, "structure.thickness.over"),
+        (lambda x, y: x, "must be greater than 0, as at"),
+        ({"plate": 0.01, "wing": 0.01}, "wing"),
+    ],
+)
+def test_bad_tapers_are_named(tmp_path: Path, thickness: Any, said: str) -> None:
+    scene = plate(1.0, {"rim": "clamped"}, mesh=str(write(tmp_path / "disk.msh", size=0.5)))
+    scene["structure"]["thickness"] = thickness
+    with pytest.raises(rotfem.SceneError, match=said):
+        rotfem.modes(scene)

@@ -170,6 +170,10 @@ class Deck:
 
 # --- formats ---------------------------------------------------------------------------------------------------------
 
+#: What the stiffness EI/L² or EI of bending is multiplied by for stiffnesses that are called rigid: what they add to
+#: deflections is below a millionth, and round-off stays below 1e-9.
+RIGID = 1e6
+
 #: Keys of [structure] that a scene may give although the file has them: they say how the blade is used.
 SETTINGS = ("damping", "root")
 
@@ -182,11 +186,13 @@ class Asked:
         structure: the table [structure] as it is given, without its section.
         section: the table of the section as it is given.
         hints: what the files have and the scene does not get; readers add to it.
+        rigid: properties that the files leave open, of a scene whose section.rigid says that they are large.
     """
 
     structure: Mapping[str, Any]
     section: Mapping[str, Any]
     hints: list[str] = field(default_factory=list)
+    rigid: list[str] = field(default_factory=list)
 
     def length(self, deck: Deck, why: str) -> float:
         """Return structure.length (m), which the file does not have; refuse a scene without."""
@@ -199,8 +205,11 @@ class Asked:
     def needs(self, deck: Deck, keys: tuple[str, ...], why: str) -> None:
         """Refuse a file that leaves properties open which the scene does not give."""
         missing = [key for key in keys if key not in self.section]
-        if missing:
-            raise problem("section", None, f"must have {', '.join(missing)} with {deck.path.name}: {why}")
+        if self.section.get("rigid") is True:
+            self.rigid.extend(missing)
+        elif missing:
+            given = f"must have {', '.join(missing)}, or rigid = true (import --rigid), with {deck.path.name}: {why}"
+            raise problem("section", None, given)
 
     def leaves_out(self, deck: Deck, what: str, key: str = "") -> None:
         """Say what a file has that is not taken, and the key of the scene that takes its place."""
@@ -244,13 +253,25 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     kind = format_of(deck, asked.section.get("format"))
     with problems_at("section.from", shown(path)), np.errstate(all="ignore"):
         read = kind.read(deck, asked)  # what overflows is refused by the section, with its key
-    own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
+    own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body", "rigid")}
+    if asked.rigid:
+        _complete(deck, asked, read)
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
         for key in there:
             if key in given and key not in ("section", *SETTINGS):
                 raise problem(f"{where}{key}", None, f"given twice; {path.name} has it too")
     settings = {key: asked.structure[key] for key in SETTINGS if key in asked.structure}
     return {**asked.structure, **read, **settings, "section": {**read["section"], **own}}
+
+
+def _complete(deck: Deck, asked: Asked, read: dict[str, Any]) -> None:
+    """Give stiffnesses that a file leaves open values at which they add nothing; a hint says them."""
+    section = read["section"]
+    bending = max(float(np.max([row[1] for row in section[key]])) for key in ("EI2", "EI3"))
+    length = read.get("length") or asked.length(deck, "rigid stiffnesses follow from it")
+    large = {key: RIGID * bending / (1.0 if key == "GJ" else length**2) for key in asked.rigid}
+    section |= large
+    asked.hints.append(f"{deck.path.name}: rigid: " + ", ".join(f"{key} = {large[key]:.3g}" for key in large))
 
 
 # --- from the axes of files to those of a spatial beam (docs/blades.md) -----------------------------------------------
