@@ -236,7 +236,8 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
     if motion.base is not None and not motion.base.constant:
         changes["base"] = _viewed_load("motion.base_acceleration", motion.base, see)
     if motion.hub is not None:
-        if isinstance(torque := motion.hub.torque, ControlledTorque):
+        torque: Any = motion.hub.torque
+        if torque.controlled:
             start = 0.0, motion.hub.speed, defaultdict[str, float](float)
             signal = see("motion.function", lambda t: torque.controller(t, *start), (), known=False)
             changes["hub"] = replace(motion.hub, torque=SeenController(controller=torque.controller, signal=signal))
