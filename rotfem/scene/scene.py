@@ -252,9 +252,8 @@ class Scene(SceneModel):
     def check_run(self) -> None:
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
-            why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
-            )
+            how = "give its end, and step, tolerance or an accuracy"
+            why = f'missing; with motion.type = "{self.motion.type}" a run is a history: {how}'
             raise SceneError(self._file, "time", None, why)
         if self.time is not None and self.time.step is None and self.time.tolerance is None:
             raise SceneError(self._file, "time.step", None, NO_STEPS)
