@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rotfem.analysis.schemes import State as State
     from rotfem.commands.cost import CostResult as CostResult
     from rotfem.commands.import_blade import import_blade as import_blade
-    from rotfem.commands.problem import Problem as Problem
+    from rotfem.commands.script import Problem as Problem
     from rotfem.commands.sweep import sweep as sweep
     from rotfem.commands.verbs import campbell as campbell
     from rotfem.commands.verbs import check as check

@@ -17,8 +17,8 @@ Progress = Callable[[float], None]
 Hint = Callable[[str], None]
 
 
-def silent(line: str) -> None:
-    """Take a hint and say nothing."""
+def silent(heard: object) -> None:
+    """Take a hint or a share and say nothing."""
 
 
 def cpu_time() -> float:

@@ -32,6 +32,7 @@ class Setting:
         step: of fixed steps, s; None without.
         max_step: longest adaptive step, s; None for that of the scheme.
         effects: names; None for those of the scene.
+        looser: how many times as large Newton's last increment may be as that of the scene; None for once.
     """
 
     theory: str
@@ -42,6 +43,7 @@ class Setting:
     step: float | None = None
     max_step: float | None = None
     effects: tuple[str, ...] | None = None
+    looser: float | None = None
 
     @classmethod
     def of(cls, scene: Scene, moving: bool = True) -> Self:
@@ -81,6 +83,8 @@ class Setting:
             out["model.effects"] = list(self.effects)
         if self.elements is not None:
             out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
+        if self.looser is not None:
+            out["solver.increment_tolerance"] = self.looser * scene.solver.increment_tolerance
         time = scene.time
         if time is not None and self.moving:
             if self.scheme != time.scheme:

@@ -10,8 +10,9 @@ section II.4).
 - Of steps p is 2: higher orders are reduced by stiff components (Hairer & Wanner 1996, section IV.15). Vibrations that
   are out of phase in one of the answers have no order. They may be small beside the motion, but hardly so in its
   acceleration: where d or the same of second differences is above `ASYMPTOTIC`, d is not divided.
-- Of elements of degree k of a beam, which end where its sections jump, p is 2k − 1: displacements at nodes and
-  eigenvalues have 2k (Strang & Fix 1973, sections 1.6 and 6.3), one less where tables have kinks.
+- Of elements of degree k of a beam, which end where its sections jump, p is 2k − 2: displacements at nodes and
+  eigenvalues have 2k (Strang & Fix 1973, sections 1.6 and 6.3), two less where it is so thin that elements lock
+  (Arnold, Numerische Mathematik 37 (1981) 405).
 - Of plates p is `CORNER`.
 - Above `ASYMPTOTIC`, and of plates, a third answer, coarser in the same ratio, shows whether the order holds. With d'
   its distance to the second one q is d'/d, but at most rᵖ, above `ASYMPTOTIC` that of p = max(2, k), where the corners
@@ -115,14 +116,14 @@ def in_longer_steps(own: Setting, end: float) -> Coarser | None:
     order = order_of(own)
     if own.step is not None:
         ratio = 2.0 ** min(CERTAIN, order)
-        setting = replace(own, step=2 * own.step)
-        return Coarser(setting, ratio, ratio, 2.0**order) if 2 * own.step <= end else None
+        longer = replace(own, step=2 * own.step, looser=ratio**2)  # as Newton's method converges with squares
+        return Coarser(longer, ratio, ratio, ratio) if 2 * own.step <= end else None
     assert own.tolerance is not None
     tolerance = min(own.tolerance * 2.0**order, LOOSEST)
     ratio = (tolerance / own.tolerance) ** (1.0 / order)
     longest = min(2.0 * (own.max_step or LONGEST * end), end)
     setting = replace(own, tolerance=tolerance, max_step=longest)
-    return Coarser(setting, ratio**CERTAIN, ratio**CERTAIN, ratio**order) if ratio > 1.1 else None
+    return Coarser(setting, *[ratio**CERTAIN] * 3) if ratio > 1.1 else None
 
 
 def on_other_meshes(own: Setting) -> list[Coarser]:
@@ -137,7 +138,7 @@ def on_other_meshes(own: Setting) -> list[Coarser]:
     half = tuple((n + 1) // 2 for n in cells)
     ratio = min(n / m for n, m in zip(cells, half, strict=True))
     elements: Elements = (half[0], half[1]) if len(half) == 2 else half[0]
-    orders = (max(2, k), CORNER if plate else max(2, 2 * k - 1), 2 * k)
+    orders = (max(2, k), CORNER if plate else 2 * max(2, k) - 2, 2 * k)
     fewer = [Coarser(replace(own, elements=elements), *(ratio**p for p in orders))] if ratio >= LONGER else []
     return [*fewer, *(degrees if plate else degrees[::-1])]
 
@@ -149,7 +150,7 @@ def coarser(own: Setting, end: float) -> list[Coarser]:
         return meshes
     pairs = [(mesh, in_longer_steps(mesh.setting, end)) for mesh in meshes]
     return [
-        Coarser(steps.setting, min(steps.far, mesh.far), min(steps.near, mesh.near), max(steps.most, mesh.most))
+        Coarser(steps.setting, min(steps.far, mesh.far), min(steps.near, mesh.near), mesh.most)
         for mesh, steps in pairs
         if steps is not None
     ]
@@ -271,7 +272,7 @@ def _compare(
     if not math.isfinite(apart.size):
         out.unknown.append("nothing moves, where it does with a coarser setting")
         return answer
-    kinks = _as_many_steps(name, own, answer)
+    kinks = name != "space" and answer.outcome.steps > FEWER * own.outcome.steps
     if kinks and own.setting.tolerance is None:
         out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
         return answer
@@ -321,11 +322,6 @@ def _next(answers: Answers, own: Answer, others: list[Coarser]) -> tuple[tuple[A
             return (found, other), ""
         why = f"{other.setting.words()}: {reason or 'places that are nodes leave no longer cells'}"
     return None, why
-
-
-def _as_many_steps(name: str, own: Answer, other: Answer) -> bool:
-    """Return whether another answer, that is to show an error by the steps, has too many for longer ones."""
-    return name != "space" and own.outcome.steps > 0 and other.outcome.steps > FEWER * own.outcome.steps
 
 
 def has_longer_cells(own: Answer, other: Answer) -> bool:

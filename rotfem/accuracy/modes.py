@@ -1,8 +1,4 @@
-"""Answers that are modes at one speed: their eigenvalues, paired by their shapes, and bounds of round-off.
-
-The error by the mesh of every mode follows from the distance to the most similar one on half the cells. Of an
-eigenvalue that is zero to round-off it is relative to the smallest other one.
-"""
+"""Answers that are modes at one speed: their eigenvalues, paired by their shapes, and bounds of round-off."""
 
 from __future__ import annotations
 

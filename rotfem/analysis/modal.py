@@ -201,7 +201,7 @@ class Spinning:
         for j, shape in enumerate(shapes):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
             name, mixed = structure.mode_name(first, *shape), others and self.shares[first][j] < 0.8
-            out.append(name.mixed_with(structure.word(others[0])) if mixed else name)
+            out.append(name.mixed_with(structure.words.get(others[0], others[0])) if mixed else name)
         pencil, pairs, speed = self.pencil, self.pairs, self.speed
         if pencil.damped and np.any(pairs.values.imag == 0.0):
             local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
@@ -428,11 +428,7 @@ class ModalAnalysis:
         return np.asarray(sizes)
 
     def needs_fixed_hub(self, what: str) -> None:
-        """Refuse what is not there for a free hub, nor for modes in the fixed frame.
-
-        Raises:
-            InputError: the hub is free, or a support differs by direction.
-        """
+        """Refuse what is not there for a free hub."""
         if self.free:
             raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 

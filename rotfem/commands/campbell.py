@@ -45,8 +45,9 @@ Array = npt.NDArray[Any]
 PAIRS = ("values", "right", "left", "errors", "bounds")
 
 
-def parse_speeds(text: str) -> list[float]:
-    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end."""
+def parse_speeds(given: Sequence[float] | str) -> list[float]:
+    """Return speeds (rad/s), also of "first:last:number" or "s1,s2,…", with the unit of all of them at the end."""
+    text = given if isinstance(given, str) else ",".join(repr(float(s)) for s in given)
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
         "with a unit such as rpm at the end if they are in another one"
@@ -79,7 +80,7 @@ def campbell_of(
     """Return the modes of a scene followed over speed (see `rotfem.campbell`); marks are keys of the scene."""
     given = {key: list(mark) if isinstance(mark, tuple) else mark for key, mark in marks.items() if mark is not None}
     scene = scene.showing("speed", speeds).replace(given)
-    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
+    values = parse_speeds(speeds)
 
     def compute(variant: Scene, *_: Any) -> CampbellResult:
         started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
@@ -175,7 +176,7 @@ def diagram(
         *([] if stopped is None else [f"{done}{speed_text(last.speed)}{goes_on}"]),
         *([] if errors is None else warnings_of(errors, Setting.of(scene, moving=False), scene)),
     ]
-    basis = None if sweep.model is None else {"columns": sweep.model.columns, "checks": sweep.model.checks}
+    basis = None if sweep.model is None else {"columns": sweep.model.lift[0].shape[1], "checks": sweep.model.checks}
     more = {
         "status": None if stopped is None else "failed" if isinstance(stopped, ComputationError) else "interrupted",
         "rated": marks.rated,

@@ -279,13 +279,14 @@ def import_(
 
     It may be of BeamDyn, ElastoDyn, OpenFAST, BModes, HAWC2, windIO or ROSS.
     """
-    from rotfem.commands.import_blade import import_blade, write_imported
+    from rotfem.commands.import_blade import import_blade
 
     with Session(quiet=quiet, debug=debug) as session:
         scene = import_blade(file, kind, overrides or (), rigid)
         session.check_writable("-o", output, scene.inputs)
         if session.first:
-            write_imported(scene, file, output)
+            remark = f"# imported from {file.name}; axes, signs and centres as in docs/blades.md, SI units, rad\n\n"
+            scene.write(output, remark)
         for line in () if quiet else scene.hints:
             session.advise(line)
         structure: Any = scene.structure

@@ -32,7 +32,7 @@ from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator, summary
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
-from rotfem.errors import ComputationError, InputError, input_of
+from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory, theories
@@ -66,15 +66,6 @@ ACCURACY, SHARE = 1e-2, 0.25
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
-
-
-def explained(
-    scene: Scene, comm: MPI.Comm, progress: Progress | None = None, terms: Mapping[str, Work] | None = None
-) -> ExplainResult:
-    """Return how much every effect and theory changes the outputs of a scene (see `rotfem.explain`)."""
-    with input_of(scene.file):
-        of = Explanation(scene, terms or {}, comm)
-        return of.result(progress or (lambda share: None))
 
 
 def needed_model(scene: Scene, terms: Mapping[str, Work], comm: MPI.Comm) -> Needed:

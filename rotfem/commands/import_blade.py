@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rotfem.results.files import write_text
 from rotfem.scene import Scene
 from rotfem.scene.files import apply_overrides
 
@@ -41,27 +39,3 @@ def import_blade(
     imported = Scene.from_dict({**tables, "structure": {"type": "spatial_beam", **structure}}, path.stem)
     imported._hints, imported._inputs = scene._hints, scene._inputs
     return imported
-
-
-def write_imported(scene: Scene, source: Path, path: Path) -> Path:
-    """Write an imported scene as TOML, one row of a table on a line, with what it came from; return the path."""
-    head = f"# imported from {source.name}; axes, signs and centres as in docs/blades.md, SI units, rad\n"
-    return write_text(path, head + toml_text(scene.tables))
-
-
-def toml_text(tables: Mapping[str, Any], above: str = "", head: str = "[{}]") -> str:
-    """Return nested tables as TOML; tables of numbers have a row on each line."""
-    nested, lines = dict[str, Any](), list[str]()
-    for key, value in tables.items():
-        rows = isinstance(value, list | tuple) and len(value) > 0 and value[0]
-        if isinstance(value, Mapping) or isinstance(rows, Mapping):
-            nested[f"{above}.{key}".lstrip(".")] = value
-        elif isinstance(rows, list | tuple):
-            lines.append(f"{key} = [\n" + "".join(f"  {json.dumps(row)},\n" for row in value) + "]")
-        else:
-            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
-    text = "".join(f"{line}\n" for line in ([f"\n{head.format(above)}", *lines] if above and lines else lines))
-    for name, value in nested.items():
-        text += toml_text(value, name) if isinstance(value, Mapping) else ""
-        text += "".join(toml_text(row, name, "[[{}]]") for row in value) if isinstance(value, list | tuple) else ""
-    return text

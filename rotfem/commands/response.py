@@ -34,7 +34,6 @@ from rotfem.commands.problem import Problem
 from rotfem.commands.processes import modal_summary, shared_out
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.loads import Load, Loads, PlaceLoad, Term
-from rotfem.mechanics.motion import Motion
 from rotfem.results.columns import described
 from rotfem.results.modes import ResponseResult
 from rotfem.scene import Scene
@@ -57,15 +56,16 @@ def response_of(
     number: int,
     per_rev: Sequence[float],
     comm: MPI.Comm,
+    problem: Problem | None = None,
 ) -> ResponseResult:
-    """Return amplitudes and phases under the harmonic loads of a scene (see `rotfem.response`)."""
+    """Return amplitudes and phases under harmonic loads (see `rotfem.response`), of a problem or of that of a scene."""
     scene, started = scene.showing("frequency", high if low is None else low), perf_counter()
     with input_of(scene.file):
-        problem = Problem.of(scene)
+        problem = problem or Problem.of(scene)
         if any(support.of_frequency for support in getattr(scene.structure, "supports", ())):
             why = "depend on the frequency of whirl; modes, campbell and unbalance take them"
             raise InputError("structure.supports", None, why)
-        problem = problem.replace(loads=swept_loads(scene, problem.motion))
+        problem = problem.replace(loads=swept_loads(problem.loads))
         analysis = analysis_of(scene, problem, comm)
         spinning = analysis.at(final_speed(scene, problem), scene.modes.count)
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
@@ -253,12 +253,12 @@ def no_damping(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int]) -> s
     )
 
 
-def swept_loads(scene: Scene, motion: Motion) -> Loads:
-    """Return the loads of a scene whose harmonic parts at the times SWEPT are 0, cos φ and sin φ times their amplitude.
+def swept_loads(given: Loads) -> Loads:
+    """Return loads whose harmonic parts at the times SWEPT are 0, cos φ and sin φ times their amplitude.
 
     So a load Re(f̂ e^{iωt}) of any frequency, f̂ = amplitude e^{iφ}, can be put together.
     """
-    made = Loads.of(scene.loads, scene.structure, motion.angle)
+    made = given.replaced({name: load.unpitched or load for name, load in given.named.items()})
     changing = {name: load for name, load in made.named.items() if not load.constant}
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
 from math import cos, pi, sin
 from typing import Any, ClassVar
@@ -260,7 +261,7 @@ def jumps_of(t: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) of rows (t, Omega), "pchip", "cubic" or "linear", but for jumps; constant outside."""
+    """Return (Omega, dOmega/dt, psi) of rows (t, Omega), straight at jumps and constant outside; see `from_table`."""
     from scipy import interpolate  # only a table needs it, and it is slow to load
 
     t, omega = np.asarray(table, dtype=float).T
@@ -296,10 +297,7 @@ def one_time(curve: Any) -> Scalar:
 
     def at(s: float) -> float:
         i = min(max(bisect_right(t, s) - 1, 0), len(powers) - 1)
-        value = 0.0
-        for power in powers[i]:
-            value = value * (s - t[i]) + power
-        return value
+        return reduce(lambda value, power: value * (s - t[i]) + power, powers[i], 0.0)
 
     return at
 

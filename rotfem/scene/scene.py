@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -206,8 +207,15 @@ class Scene(SceneModel):
             ours = os.path.realpath(start / value) in files and not Path(value).is_absolute()
             return os.path.relpath(start.resolve() / value, path.parent.resolve()) if ours else str(value)
 
+        def joined(array: re.Match[str]) -> str:
+            """Return an array in a line where it fits one."""
+            line = " ".join(array[1].split()).rstrip(",")
+            return f"[{line}]" if len(line) < 100 else array[0]
+
         try:
-            text = tomli_w.dumps(moved(self._tables))
+            text, before = tomli_w.dumps(moved(self._tables)), ""
+            while text != before:
+                before, text = text, re.sub(r'\[\n((?: +(?![ \]])[^"{}=\n]*,\n)+) *\]', joined, text)
         except TypeError:
             why = "holds a Python function, so that it cannot be written as TOML"
             raise SceneError(self._file, allowed=why) from None
@@ -244,9 +252,8 @@ class Scene(SceneModel):
     def check_run(self) -> None:
         """Check that the scene can be run: a time history needs times, a steady state a constant speed."""
         if self.time is None and not self.motion.is_steady:
-            why = (
-                f'missing; with motion.type = "{self.motion.type}" a run is a history: give its end, step or tolerance'
-            )
+            how = "give its end, and step, tolerance or an accuracy"
+            why = f'missing; with motion.type = "{self.motion.type}" a run is a history: {how}'
             raise SceneError(self._file, "time", None, why)
         if self.time is not None and self.time.step is None and self.time.tolerance is None:
             raise SceneError(self._file, "time.step", None, NO_STEPS)

@@ -46,6 +46,10 @@ class Beam(Structure):
         grid, s = problem.mesh, self.data
         root = getattr(s, "root_position", (s.hub_radius, 0.0, 0.0))
         self.length, self.hub_radius, self._section = s.length, root[0], s.section
+        # A beam on a free hub, or of round sections, which have no edge, is no blade.
+        blade = problem.motion.hub is None and not getattr(s, "has_round_sections", False)
+        y, z = np.abs(problem.motion.axis[1:])
+        self.words = {family: words[0 if blade else 1 + int(y > z)] for family, words in WORDS.items()}
         self.radius = self._radius()
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
@@ -158,20 +162,10 @@ class Beam(Structure):
 
     # --- values -------------------------------------------------------------------------------------------------
 
-    def word(self, family: str) -> str:
-        """Return what a family is called in names of modes.
-
-        A blade bends flapwise and edgewise. A beam on a free hub, or of round sections, which have no edge, is none: it
-        bends in the plane of rotation and out of it.
-        """
-        blade = self.problem.motion.hub is None and not getattr(self.data, "has_round_sections", False)
-        y, z = np.abs(self.problem.motion.axis[1:])
-        return WORDS[family][0 if blade else 1 + int(y > z)] if family in WORDS else family
-
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> ModeName:
         """Return the name of a mode shape (n, components) by its family and its number, one more than its nodes."""
         number = sign_changes(in_phase(self.oriented(values)[:, self.families[family][1]])) + 1
-        return ModeName(self.word(family), number)
+        return ModeName(self.words.get(family, family), number)
 
 
 # --- the planar beam --------------------------------------------------------------------------------------------------

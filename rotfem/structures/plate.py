@@ -316,9 +316,11 @@ class Plate(Structure):
         """Make the constants and fields of thickness and material, and of the hub."""
         s, degree = self.data, self.V.element.basix_element.degree
         for name, value in properties(s).items():
-            varies = not isinstance(value, float)
-            field = over_place(s, name, self.grid, self.inner_rows, degree) if varies else self.constant(value)
-            self.section[name] = field
+            key = name if getattr(s, name) is not None else "G12"
+            uniform = isinstance(value, float)
+            self.section[name] = (
+                self.constant(value) if uniform else over_place(s, key, self.grid, self.inner_rows, degree)
+            )
         names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")
         root = zip(names_of, s.root_position, strict=True)
         self._root = [self.scalar(name, c) if c != 0.0 or name == "hub_radius" else 0 for name, c in root]

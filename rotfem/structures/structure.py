@@ -251,6 +251,8 @@ class Structure:
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
         self.load_constants: dict[str, Amplitude] = {}
+        #: Family ↦ its word in names of modes, where that is another one.
+        self.words: dict[str, str] = {}
         #: Numbers of the components that are unknowns; the others are inactive, and zero.
         self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
         self.size = len(self.active) + len(self.extra)
@@ -532,10 +534,6 @@ class Structure:
     def surface(self) -> npt.NDArray[np.int64] | None:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
-
-    def word(self, family: str) -> str:
-        """Return what a family is called in names of modes."""
-        return family
 
     def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
         """Return whether a shape (n, components) is that of a rigid body, but for 0.5 % of its largest displacement."""

@@ -281,3 +281,25 @@ def test_explain_goes_on_without_an_effect_that_the_theory_cannot_have(bed: None
     assert rows.loc["bed", "verdict"] == "not available"
     assert "is no polynomial" in rows.loc["bed", "why"]
     assert rows.loc["centrifugal", "verdict"] != "not available"
+
+
+def test_a_problem_has_the_diagram_and_the_response_of_its_scene() -> None:
+    force = {"tip_force": {"harmonic": {"amplitude": [0, 1], "frequency": 1}}}
+    scene = rotfem.Scene.from_dict(tables(modes={"count": 2}, loads=force, model={"theory": "consistent_linear"}))
+    of_scene = rotfem.Problem.of(scene)
+    one, other = of_scene.campbell("0:30:3rpm", count=2), rotfem.campbell(scene, "0:30:3rpm", error=False)
+    assert one.frequencies == pytest.approx(other.frequencies, rel=1e-12)
+    assert one.critical_speeds == other.critical_speeds
+    answer = of_scene.response("0.1 Hz", "2 Hz", number=20, count=2, speed="10 rpm")
+    at = rotfem.response(scene.replace({"motion.speed": "10 rpm"}), "0.1 Hz", "2 Hz", number=20)
+    assert abs(answer.direct - at.direct).max() <= 1e-12 * abs(at.direct).max()
+    script = problem().replace(loads=rotfem.Loads(**force))
+    assert script.response(number=5, count=1).outputs == answer.outputs
+    with pytest.raises(InputError, match="needs a harmonic load"):
+        problem().response()
+
+
+@pytest.mark.parametrize(("verb", "option"), [("modes", "matrices"), ("modes", "animate"), ("check", "report")])
+def test_what_is_written_needs_a_folder(verb: str, option: str) -> None:
+    with pytest.raises(InputError, match="folder: must be given"):
+        getattr(rotfem, verb)(tables(), **{option: 1})

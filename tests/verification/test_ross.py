@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.commands.import_blade import write_imported
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 
@@ -81,7 +80,7 @@ def test_whirl_damping_and_unbalance(case: str) -> None:
 
 def test_rotor_example_from_its_file(tmp_path: Path) -> None:
     """Modes of `rotor_example`, read, written and read again, at 200 rad/s: ROSS with 48 elements, 1e-5."""
-    write_imported(rotfem.import_blade(EXAMPLE, changes=["motion.speed=200.0"]), EXAMPLE, tmp_path / "rotor.toml")
+    rotfem.import_blade(EXAMPLE, changes=["motion.speed=200.0"]).write(tmp_path / "rotor.toml")
     rows = rotfem.modes(tmp_path / "rotor.toml").rows
     found = [row["frequency"] for row in rows if "whirl" in row["label"]][:4]
     np.testing.assert_allclose(found, [91.757449, 96.31681, 272.65241, 298.34897], rtol=1e-5)
