@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,14 @@ def of_unknowns(components: Sequence[str]) -> Iterator[None]:
 def number_of(function: Callable[..., Any], key: str, of: str) -> Callable[..., float]:
     """Return a user's function that returns a number; it raises an InputError where the other one does not."""
     one = checked(function, key, 1, of)
-    return lambda *arguments: float(one(*arguments)[0])
+
+    def at(*arguments: Any) -> float:
+        with suppress(Exception):
+            if isinstance(value := function(*arguments), float) and math.isfinite(value):
+                return value
+        return float(one(*arguments)[0])  # it says what is wrong
+
+    return at
 
 
 def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: bool = False) -> Callable[..., Array]:

@@ -11,6 +11,7 @@ H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what i
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -71,6 +72,9 @@ AIM_OF_ERROR, SHRINK = 0.5, 0.2
 
 #: Steps, rejected ones included, that a march may take.
 MOST_STEPS = 500_000
+
+#: Knots from which on adaptive steps, which may end at each, take more than some ten seconds: a warning beforehand.
+MANY = 10_000
 
 #: What to do beyond.
 QUICKER = (
@@ -191,6 +195,8 @@ class March:
         longest, shortest = self.steps.max_step or LONGEST * end, self.steps.min_step or 1e-9 * end
         error, k = LocalError(self.system, self.scheme, end), self.scheme.order + 1
         knots, _ = knots_of(self.system.signals, np.linspace(0.0, end, 2001), self.steps.breakpoints)
+        if len(knots) > MANY and self.system.comm.rank == 0:
+            logging.getLogger("rotfem").warning(f"rotfem: adaptive steps may end at {len(knots)} knots; {QUICKER}")
         pace = start.pace or Pace(min(longest, 1e-4 * end), 1.0, error.displacement(start))
         state, seen, grows = start, View(1), True
 
@@ -275,7 +281,7 @@ class March:
             with s.view.as_in(view):
                 s.set_time(t)
                 s.set_state(state.q, state.v, state.a)
-                moved.append(s.chord() if moved else s.correction((1.0, c, c * c)))
+                moved.append(np.array(s.correction((1.0, c, c * c))))
         return error.size(moved[1] - moved[0]) * self.steps.end / part.length
 
     # --- one step ----------------------------------------------------------------------------------------------------

@@ -428,11 +428,7 @@ class ModalAnalysis:
         return np.asarray(sizes)
 
     def needs_fixed_hub(self, what: str) -> None:
-        """Refuse what is not there for a free hub, nor for modes in the fixed frame.
-
-        Raises:
-            InputError: the hub is free, or a support differs by direction.
-        """
+        """Refuse what is not there for a free hub."""
         if self.free:
             raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 

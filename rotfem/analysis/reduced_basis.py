@@ -161,11 +161,6 @@ class SpeedModel:
         self._speeds: Array = np.array(speeds)
         self._matrices: Array = np.array(matrices)
 
-    @property
-    def columns(self) -> int:
-        """Number of vectors in the basis."""
-        return int(self.lift[0].shape[1])
-
     def _at(self, speed: float) -> Array:
         """Return M, C and K at a speed, (3, m, m)."""
 

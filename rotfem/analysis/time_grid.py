@@ -149,7 +149,7 @@ def find_knots(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
     cells, n, found, size = np.stack([times[:-1], times[1:]], axis=1), SAMPLES // len(times), list[Array](), 0.0
     n = min(max(n, 8), 128)
     for level in range(3):
-        x = (np.arange(n) + 0.5) / n
+        x = (np.arange(n) + 0.618 * np.arange(1, n + 1) % 1.0) / n  # uneven, or what alternates may look constant
         cubic = np.vander(x - 0.5, 4)
         t = cells[:, :1] + np.diff(cells) * x
         f = signal.values(t.ravel()).reshape(len(cells), n, -1)
@@ -159,7 +159,8 @@ def find_knots(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
         if level == 0:
             find_jumps(signal, np.unique([*times, *t[off].ravel()]), size)
             signal.knots = np.unique([*signal.knots, *breakpoints])
-            cuts = cuts[np.diff(np.searchsorted(signal.knots, cells[off])).ravel() == 0]
+            jumps = np.diff(np.searchsorted(signal.knots, cells[off])).ravel()
+            cuts = cuts[(jumps == 0) | (jumps > FEW)]  # of many jumps some lie between samples
             if len(cuts):
                 signal.changes = float(cuts[0, 0]), float(cuts[0, 1] - cuts[0, 0])
         found.append(cuts.ravel())

@@ -176,7 +176,7 @@ def diagram(
         *([] if stopped is None else [f"{done}{speed_text(last.speed)}{goes_on}"]),
         *([] if errors is None else warnings_of(errors, Setting.of(scene, moving=False), scene)),
     ]
-    basis = None if sweep.model is None else {"columns": sweep.model.columns, "checks": sweep.model.checks}
+    basis = None if sweep.model is None else {"columns": sweep.model.lift[0].shape[1], "checks": sweep.model.checks}
     more = {
         "status": None if stopped is None else "failed" if isinstance(stopped, ComputationError) else "interrupted",
         "rated": marks.rated,

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 from rotfem.commands.console import Job, Session
-from rotfem.errors import ComputationError, SceneError, Stopped, input_of
+from rotfem.errors import ComputationError, InputError, SceneError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.scene import Scene
 from rotfem.scene.scene import as_scene
@@ -88,11 +88,8 @@ def verb(function: F) -> F:
     *own, last = signature(function).parameters.values()
     shared = Computing if "Computing" in last.annotation else Common
     kinds = {name: getattr(kind, "__forward_arg__", kind) for name, kind in shared.__annotations__.items()}
-    common = [
-        Parameter(name, Parameter.KEYWORD_ONLY, default=DEFAULTS.get(name, False if kind == "bool" else None))
-        for name, kind in kinds.items()
-    ]
-    common = [parameter.replace(annotation=kinds[parameter.name]) for parameter in common]
+    defaults = {name: DEFAULTS.get(name, False if kind == "bool" else None) for name, kind in kinds.items()}
+    common = [Parameter(n, Parameter.KEYWORD_ONLY, default=defaults[n], annotation=kind) for n, kind in kinds.items()]
     vars(function)["__signature__"] = signature(function).replace(parameters=[*own, *common])
     VERBS[function.__name__] = function
     return function
@@ -127,6 +124,8 @@ def begun(name: str, scene: AnyScene, common: Computing | Common, error: bool | 
             job.scene = job.scene.replace(changes)
         if (folder := given.get("folder")) is not None:
             job.open(Path(folder), name)
+        elif job.report:
+            raise InputError("folder", None, "must be given, for report.html")
     try:
         yield job
     except BaseException as failure:
@@ -215,7 +214,7 @@ def modes(
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
     with begun("modes", scene, common, error) as job:
-        from rotfem.commands.modes import analysed, at_speed
+        from rotfem.commands.modes import analysed, at_speed, models
 
         if speed is not None:
             job.scene = at_speed(job.scene, listed("--speed", speed, 1)[0])
@@ -225,9 +224,9 @@ def modes(
         hint, terms = common.get("hint", silent), common.get("terms")
         result = analysed(job.scene, job.comm, sensitivities, blade_tables, participation, hint, terms)
         further: list[Writer] = []
-        if job.results is not None and (state_space or matrices):
-            from rotfem.commands.modes import models
-
+        if job.results is None and (state_space or matrices or animate is not None):
+            raise InputError("folder", None, "must be given, for what state_space, matrices and animate write")
+        if job.results is not None:
             further += models(job.scene, result, state_space, matrices)
         if animate is not None:
             from rotfem.results.surfaces import animate as draw

@@ -6,7 +6,7 @@ elimination, with one factorisation for two right-hand sides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from time import perf_counter
 from typing import Any
 
@@ -23,7 +23,7 @@ from rotfem.equations.system import Instant, System
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.time_signals import View, viewed
-from rotfem.numerics.projection import bordered, summed
+from rotfem.numerics.projection import bordered
 from rotfem.structures.structure import check_memory
 
 Array = npt.NDArray[np.float64]
@@ -62,28 +62,6 @@ def with_all_unknowns(system: System) -> System:
     return compile_system(problem.replace(inactive=()), system.comm, moving=False) if problem.inactive else system
 
 
-class Border:
-    """Solutions of A x + b psi = R, c·x + d psi = r with a factor of A: A y = R, A z = b, psi = (r − c·y)/(d − c·z)."""
-
-    def __init__(self, system: System, solver: Any, b: Any, c: Any, d: float):
-        self._system, self._solver, self._c = system, solver, c.array.copy()
-        self._z = system.local(solver.solve(b))
-        self._pivot = d - self._along(self._z)
-        if self._pivot == 0.0:
-            raise ComputationError("the hub equation is singular")
-
-    def _along(self, x: Array) -> float:
-        return float(summed(self._system.comm, self._c @ x[: len(self._c)]))
-
-    def __call__(self, R: Any, r: float) -> Array:
-        """Return x and, last, psi."""
-        y = self._system.local(self._solver.solve(R))
-        psi = (r - self._along(y)) / self._pivot
-        out = np.empty(len(y) + 1)
-        out[:-1], out[-1] = y - self._z * psi, psi
-        return out
-
-
 class WithHub(System):
     """What the angle of a free hub adds to a system: unknowns of a motion are those of the structure, then psi.
 
@@ -91,7 +69,6 @@ class WithHub(System):
     """
 
     row: HubRow
-    _border: Border  #: of the last tangent
 
     def __init__(self, *arguments: Any):
         super().__init__(*arguments)
@@ -126,23 +103,15 @@ class WithHub(System):
     # --- solutions ---------------------------------------------------------------------------------------------------
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
-        """Return Newton's correction of (q, psi) (see `Border`)."""
+        """Return Newton's correction of (q, psi): A y = R, A z = b, dpsi = (r − c·y)/(d − c·z)."""
         row, (c_k, c_v, c_m), started = self.row, shifts, perf_counter()
         R = self.residual()
         A, changed = self.tangent(*shifts, None if before is None else before[:-1])
         b, c = self.spin_derivative(c_v, c_m), row.row(shifts)
         by_angle, by_speed = row.hub.torque.slopes(self.time, row.seen)
         r, d = -row.residual(self.time), row.diagonal(c_v, c_m) - c_k * by_angle - c_v * by_speed
-        return self._solved(started, R, r, lambda: Border(self, self.factor(A, changed), b, c, d))
-
-    def chord(self) -> Array:
-        """Return the correction of (q, psi) at the state with the present factor and border."""
-        return self._solved(perf_counter(), self.residual(), -self.row.residual(self.time), lambda: self._border)
-
-    def _solved(self, started: float, R: Any, r: float, border: Callable[[], Border]) -> Array:
-        """Return the solution with a border, and count the time of its two parts."""
-        assembled_at, self._border = perf_counter(), border()
-        out = self._border(R, r)
+        assembled_at = perf_counter()
+        out = self._eliminated(self.factor(A, changed), (R, b), c, r, d)
         self.seconds["assemble"] += assembled_at - started
         self.seconds["solve"] += perf_counter() - assembled_at
         return out
@@ -152,7 +121,17 @@ class WithHub(System):
         row, (solver, massless) = self.row, self.mass_solver()
         r, R, b = -row.residual(self.time), self.residual(), self.spin_derivative(0.0, 1.0)
         R.array[massless] = b.array[massless] = 0.0
-        return Border(self, solver, b, row.row((0.0, 0.0, 1.0)), row.diagonal(0.0, 1.0))(R, r)
+        return self._eliminated(solver, (R, b), row.row((0.0, 0.0, 1.0)), r, row.diagonal(0.0, 1.0))
+
+    def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
+        y, z = (self.local(solver.solve(b)) for b in right)
+        n, comm = len(c.array), self.comm
+        sums = np.array([c.array @ y[:n], c.array @ z[:n]])
+        cy, cz = comm.allreduce(sums) if comm.size > 1 else sums
+        if d == cz:
+            raise ComputationError("the hub equation is singular")
+        dpsi = float((r - cy) / (d - cz))
+        return np.append(y - z * dpsi, dpsi)
 
     def imbalance(self) -> Array:
         """Return the owned part of −F at the state, and that of the hub."""

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from math import cos, pi, sin
 from typing import Any, ClassVar
 
@@ -289,10 +290,7 @@ def one_time(curve: Any) -> Scalar:
 
     def at(s: float) -> float:
         i = min(max(bisect_right(t, s) - 1, 0), len(powers) - 1)
-        value = 0.0
-        for power in powers[i]:
-            value = value * (s - t[i]) + power
-        return value
+        return reduce(lambda value, power: value * (s - t[i]) + power, powers[i], 0.0)
 
     return at
 

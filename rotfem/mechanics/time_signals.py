@@ -14,6 +14,7 @@ scheme have its impulse and first moment, and noise of the input does not add up
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -25,7 +26,7 @@ import numpy.typing as npt
 from numpy.polynomial.legendre import leggauss
 
 from rotfem.mechanics.differentiation import Derivative
-from rotfem.mechanics.free_hub import Torque
+from rotfem.mechanics.free_hub import ControlledTorque, Seen, Torque
 from rotfem.mechanics.loads import Load, PlaceLoad
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
@@ -120,7 +121,7 @@ class TimeSignal:
         """Return the values at times (n,), shape (n, components)."""
         if self.many is not None:
             return self.many(t)
-        return np.array([np.atleast_1d(self.at(float(s))) for s in t], dtype=float).reshape(len(t), -1)
+        return np.array([self.at(float(s)) for s in t], dtype=np.float64).reshape(len(t), -1)
 
     def fitted(self, t: Any, *line: Any) -> Array:
         """Return f̄ of a step (see `Fit`) at times (n,), shape (n, components); at one, shape (components,)."""
@@ -190,6 +191,18 @@ class SeenTorque(Torque):
         return super().at(t, True) if after else self.seen(t)
 
 
+@dataclass(frozen=True)
+class SeenController(ControlledTorque):
+    """A controller; what it changes by time alone, in the state at the start, is evaluated as a view says."""
+
+    signal: TimeSignal = field(kw_only=True)
+
+    def on(self, t: float, state: Callable[[], Seen], after: bool = False) -> float:
+        """Return M at time t (s) and a state."""
+        own, signal = super().on(t, state), self.signal
+        return own + signal.seen(t) - signal.at(t) if len(signal.knots) else own
+
+
 def viewed(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
     """Return the problem with signals that are evaluated as a view says, and those that change with time."""
     signals: list[TimeSignal] = []
@@ -223,7 +236,12 @@ def _viewed_motion(motion: Motion, see: Callable[..., TimeSignal]) -> Motion:
     if motion.base is not None and not motion.base.constant:
         changes["base"] = _viewed_load("motion.base_acceleration", motion.base, see)
     if motion.hub is not None:
-        if len((torque := motion.hub.torque).knots):
+        torque: Any = motion.hub.torque
+        if torque.controlled:
+            start = 0.0, motion.hub.speed, defaultdict[str, float](float)
+            signal = see("motion.function", lambda t: torque.controller(t, *start), (), known=False)
+            changes["hub"] = replace(motion.hub, torque=SeenController(controller=torque.controller, signal=signal))
+        elif len(torque.knots):
             signal = see("motion.torque", torque.at, torque.knots, many=lambda t: torque.many(t)[:, None])
             changes["hub"] = replace(motion.hub, torque=SeenTorque(torque.pulses, torque.table, signal.seen))
     elif motion.changes_speed:

@@ -186,7 +186,8 @@ FLAGS = ("-g0", "-w")
 def form(f: Any, once: bool = False) -> Any:
     """Return a UFL form compiled, over the communicator of its mesh."""
     mesh = f.ufl_domains()[0].ufl_cargo()
-    flag = (SELDOM if once else OFTEN)[mesh.topology.dim]
+    wide = any(max(a.ufl_shape, default=1) > LARGEST_BLOCK for a in f.arguments())  # code as long as for surfaces
+    flag = SELDOM[mesh.topology.dim] if once else OFTEN[2 if wide else mesh.topology.dim]
     return _compiled(fem.form, f, comm=mesh.comm, part=f.signature()[:2], flag=flag)
 
 

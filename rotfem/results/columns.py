@@ -161,9 +161,6 @@ def shown_unit(column: str, shown: str = "") -> str:
 #: Name of a labelled array ↦ its dimensions and values.
 Variables = dict[str, tuple[tuple[str, ...], npt.NDArray[Any]]]
 
-#: What says where the others are, in labelled arrays.
-COORDINATES = ("x", "y", "triangles", "label")
-
 
 @dataclass(frozen=True)
 class Columns:
@@ -239,7 +236,7 @@ def dataset(variables: Variables, attributes: Mapping[str, Any]) -> xarray.Datas
     import xarray
 
     out = xarray.Dataset(variables, attrs=dict(attributes))
-    out = out.set_coords([name for name in COORDINATES if name in out])
+    out = out.set_coords([name for name in ("x", "y", "triangles", "label") if name in out])
     for name, array in out.variables.items():
         what, unit = described(str(name))
         if name in ("frequency", "frequency_hz") and "frame" in attributes:
@@ -363,11 +360,6 @@ def largest(values: Iterable[float | None]) -> float:
 def per_cent(ratio: float | None) -> str:
     """Return a ratio as a number of per cent with two digits, of large ones three."""
     return number(None if ratio is None else 100 * ratio, 100.0, 2 if ratio is None or abs(ratio) < 0.1 else 3)
-
-
-def named(column: str) -> str:
-    """Return what a column is called, with its unit."""
-    return label(column).removesuffix(" (–)")
 
 
 def by_unit(values: dict[str, float]) -> dict[str, float]:

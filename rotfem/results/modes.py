@@ -23,7 +23,7 @@ from rotfem.results.columns import (
     Variables,
     by_unit,
     in_unit,
-    named,
+    label,
     number,
     numbers,
     per_cent,
@@ -321,7 +321,7 @@ class ResponseResult(Rows):
         units, peaks = ShownUnits.of(self.summary), self.summary["peaks"]
         scales = by_unit({name: peak["amplitude"] for name, peak in peaks.items()})
         rows = [
-            (named(name), number(peak["amplitude"], scales[name]), f"{units.frequencies(peak['frequency']):.8g}")
+            (label(name), number(peak["amplitude"], scales[name]), f"{units.frequencies(peak['frequency']):.8g}")
             for name, peak in peaks.items()
         ]
         return [ShortTable((f"output, {self.frame} frame", "largest amplitude", f"at ({units.frequency})"), rows)]

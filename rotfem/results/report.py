@@ -153,17 +153,14 @@ def interactive(figure: Figure) -> Any:
     from bokeh.models import Range1d
 
     axes = [axis for axis in figure.axes if axis.axison]
-    if not axes or any(a.name == "3d" or a.images or a.collections or any(map(_is_bar, a.patches)) for a in axes):
+    if not axes or any(a.name == "3d" or a.images or a.collections for a in axes):
+        return None
+    if any(patch.get_data_transform() == a.transData for a in axes for patch in a.patches):  # bars, no ranges
         return None
     x: dict[tuple[float, float], Any] = {}
     panels = [panel(a, x.setdefault(a.get_xlim(), Range1d(*map(float, a.get_xlim())))) for a in axes]
     options = {"sizing_mode": "stretch_width", "toolbar_location": "right", "toolbar_options": {"logo": None}}
     return gridplot(panels, ncols=1, **options)
-
-
-def _is_bar(patch: Any) -> bool:
-    """Return whether a patch has ends in both directions, as a range from one side of a panel to the other has not."""
-    return bool(patch.get_data_transform() == patch.axes.transData)
 
 
 def panel(axes: Any, x_range: Any) -> Any:

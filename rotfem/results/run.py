@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotfem.results.columns import Columns, ShortTable, Variables, by_unit, dataset, largest, named, number
+from rotfem.results.columns import Columns, ShortTable, ShownUnits, Variables, by_unit, dataset, label, largest, number
 from rotfem.results.files import write_netcdf
 from rotfem.results.result import Array, OfTable, Result
 from rotfem.short import short_fields
@@ -139,20 +139,21 @@ class RunResult(Result):
 
     def tables(self) -> list[ShortTable]:
         """Return extremes and last values of the tip's displacement and of a free hub, of a steady state all values."""
-        found = self.figures
+        found, units = self.figures, ShownUnits.of(self.summary)
         ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
         if self.steady:
             scales = by_unit(ends)
-            values = [(named(name), number(ends[name], scales[name])) for name in ends]
+            values = [(label(name), number(ends[name], scales[name])) for name in ends]
             return [ShortTable((f"{self.frame} frame", "value"), values)]
         shown = [name for name in ends if name.startswith(("tip_u", *HUB)) and f"{name}_min" in found]
         scales = by_unit({name: largest(found[f"{name}_{end}"] for end in ("min", "max")) for name in shown})
         head, rows = [f"{self.frame} frame", "smallest", "at t (s)", "largest", "at t (s)", "at the end"], []
         for name in shown:
-            low, high, last = (number(found[f"{name}_{end}"], scales[name]) for end in ("min", "max", "final"))
+            unit, factor = (units.speed, float(units.speeds(1.0))) if name == "psi_dot" else ("", 1.0)
+            low, high, last = (number(factor * found[f"{name}_{end}"], scales[name]) for end in ("min", "max", "final"))
             when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
             residual = [f"{found[key]:.6g}" for key in [f"{name}_residual"] if key in found]
-            rows.append((named(name), low, when[0], high, when[1], last, *residual))
+            rows.append((label(name, unit), low, when[0], high, when[1], last, *residual))
         if "torque_end" in found:
             head.append(f"± after {found['torque_end']:.6g} s")
         return [ShortTable(tuple(head), rows)] if rows else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -332,7 +333,7 @@ class SpatialBeamStructure(BeamStructure):
             return False
         return self.has_round_sections and all(same_about_axis(body.inertia_matrix) for body in self.bodies.values())
 
-    @property
+    @cached_property
     def has_round_sections(self) -> bool:
         """Whether all sections are the same in all directions about the axis."""
         places = np.union1d(self.section.knots, self.length)

@@ -297,3 +297,9 @@ def test_a_problem_has_the_diagram_and_the_response_of_its_scene() -> None:
     assert script.response(number=5, count=1).outputs == answer.outputs
     with pytest.raises(InputError, match="needs a harmonic load"):
         problem().response()
+
+
+@pytest.mark.parametrize(("verb", "option"), [("modes", "matrices"), ("modes", "animate"), ("check", "report")])
+def test_what_is_written_needs_a_folder(verb: str, option: str) -> None:
+    with pytest.raises(InputError, match="folder: must be given"):
+        getattr(rotfem, verb)(tables(), **{option: 1})

@@ -98,3 +98,9 @@ def test_controllers_that_are_refused(function: Any, words: str) -> None:
     with pytest.raises(rotfem.SceneError, match=r"motion.function") as caught:
         history(function)
     assert words in str(caught.value)
+
+
+def test_a_torque_that_changes_its_sign_within_steps_has_no_mean() -> None:
+    """±10 N·m by turns of 0.1 ms, all −10 at the ends of steps; a speed of −½ · 0.1 ms · 10 N·m/I is left."""
+    found = history(lambda t, psi, psi_dot, tip: 10.0 if int(t * 1e4) % 2 else -10.0, EI=1e9, GA=1e10)
+    assert np.abs(found["psi"]).max() < 1e-2 * 10.0 / INERTIA * 4.0**2 / 2
