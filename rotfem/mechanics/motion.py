@@ -135,7 +135,7 @@ class Motion:
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
-            "sharp": tuple(t) if kind == "linear" else (t[0], *t[jumps_of(t)], *t[jumps_of(t) + 1], t[-1]),
+            "sharp": (t[0], *t[jumps_of(t)], *t[jumps_of(t) + 1], t[-1]) if kind in ("pchip", "cubic") else tuple(t),
             "bent": tuple(t) if kind == "pchip" else (),
             "arrays": True,
         }
