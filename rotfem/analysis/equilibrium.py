@@ -281,6 +281,8 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
         if afresh:
             q = recounted(system, q)
             reference = system.reference
+    if least < 1.0:  # what is known of increments at other loads has ended the iterations there
+        q = balance(system, omega, 1.0, q, Newton(newton.tolerance, newton.max_iterations))
     system.structure.check_range(q)
     return Raised(np.asarray(q), reference, critical, least)
 

@@ -85,11 +85,6 @@ def panels_over(
     return figure, panels
 
 
-def power_of_ten(value: float, place: float = 0.0) -> str:
-    """Return a tick of a logarithmic axis; Matplotlib's own takes a grammar of formulas."""
-    return "10" + str(round(np.log10(value))).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
 def not_zero(columns: Mapping[str, Array], title: str) -> tuple[list[str], str]:
     """Return the columns that have a panel, and the title with a further line that names the others."""
     zero = zeros(columns)
@@ -219,7 +214,7 @@ def response_figure(result: ResponseResult) -> Figure:
         sizes = np.abs(result.direct[:, [own[name] for name in names]])
         seen = max(0.3 * float(np.min(np.quantile(sizes, 0.05, axis=0))), ZERO * float(np.max(sizes)))
         left.set_ylim(seen, 3.0 * float(np.max(sizes)))
-        left.yaxis.set_major_formatter(power_of_ten)
+        left.yaxis.set_major_formatter("{x:.0e}")
         right.set(ylim=(-190, 190), yticks=np.arange(-180, 181, 90))
         right.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
         for panel in (left, right):
