@@ -192,9 +192,8 @@ def main() -> None:
     for what, found in (("at heads of modules", circles(False)), ("in functions too", circles(True))):
         print(f"\ncircles of imports {what}: {len(found)}")
         print("".join(f"  {' -> '.join(circle)}\n" for circle in found), end="")
-    for verb in ("run", "explain", "cost"):
-        inside = (m for m in MODULES if m.startswith("commands.") and m not in ("commands.cli", "commands.verbs"))
-        stays = walk(next(m for m in inside if verb in functions(m)), verb, "scene")
+    for verb, function in {"run": "simulate", "explain": "needed_model", "cost": "studied"}.items():
+        stays = walk(f"commands.{verb}", function, "scene")
         print(f"`scene` of {verb}: {len(stays)} functions in {len({module for module, *_ in stays})} files")
 
 
