@@ -240,6 +240,16 @@ class MomentTable(LoadTable):
     UNIT: ClassVar[str] = "N*m"
 
 
+def bare_tables(loads: Any, length: Any) -> Any:
+    """Return the tables of loads; rows alone are over time unless they may be over the span, from 0 to the length."""
+    if not isinstance(loads, Mapping) or isinstance(length, str):
+        return loads
+    rows = {key: loads[key] for key in ("distributed", "pressure") if isinstance(loads.get(key), list)}
+    whole = {key: t for key, t in rows.items() if t and all(isinstance(row, list) and row for row in t)}
+    timed = {key: t for key, t in whole.items() if [t[0][0], t[-1][0]] != [0.0, length]}
+    return {**loads, **{key: {"over_time": table} for key, table in timed.items()}}
+
+
 class SpanLoad(LoadTable):
     """A force along the structure (N/m, or N/m² on a plate), which may vary over the span, over time, and over both.
 

@@ -21,7 +21,7 @@ from rotfem.errors import OutputError, SceneError, show
 from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import READ, apply_overrides, read_toml, set_keys, to_builtin
-from rotfem.scene.loads import LoadsTable, check_in_plane, check_loads
+from rotfem.scene.loads import LoadsTable, bare_tables, check_in_plane, check_loads
 from rotfem.scene.motion import AnyMotion, MotionTable
 from rotfem.scene.settings import (
     NO_STEPS,
@@ -131,7 +131,9 @@ class Scene(SceneModel):
         tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
         whole, hints = designed(tables, file), list[str]()
         structure = whole.get("structure")
-        kind = structure.get("type") if isinstance(structure, Mapping) else None
+        kind, length = (structure.get(k) if isinstance(structure, Mapping) else None for k in ("type", "length"))
+        if "loads" in whole:
+            whole = {**whole, "loads": bare_tables(whole["loads"], length)}
         context = {"directory": directory, "accuracy": whole.get("accuracy"), "type": kind}
         try:
             scene = cls.model_validate(whole, context={**context, "hints": hints})

@@ -33,9 +33,11 @@ def test_functions_are_refused_with_the_key() -> None:
         assert caught.value.key.startswith("loads.")
 
 
-def test_a_bare_table_over_time_or_the_span_is_refused() -> None:
+def test_a_bare_table_is_over_time_or_refused_where_it_may_be_over_the_span() -> None:
     with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
-        scene({"distributed": RAMP}, **TIME)
+        scene({"distributed": [[0.0, 0, 1], [BEAM["length"], 0, 2]]}, **TIME)
+    load = scene({"distributed": RAMP}, **TIME).loads.distributed
+    assert load is not None and load.given[0] == "over_time"
 
 
 def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
