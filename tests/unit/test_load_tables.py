@@ -37,7 +37,8 @@ def test_a_bare_table_is_over_time_or_refused_where_it_may_be_over_the_span() ->
     with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
         scene({"distributed": [[0.0, 0, 1], [BEAM["length"], 0, 2]]}, **TIME)
     load = scene({"distributed": RAMP}, **TIME).loads.distributed
-    assert load is not None and load.given[0] == "over_time"
+    assert load is not None
+    assert load.given[0] == "over_time"
 
 
 def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
