@@ -25,10 +25,11 @@ from exudyn.utilities import CreateSymbolicUserFunction
 SPEED, DURATION, LENGTH, END = 6.0, 15.0, 10.0, 20.0
 
 
-def cables(mbs: Any, elements: int, length: float, EA: float, EI: float, mass: float) -> list[Any]:
-    """Add a straight beam along x of cubic elements without shear; return its nodes."""
-    h = length / elements
-    nodes = [mbs.AddNode(item.NodePoint2DSlope1(referenceCoordinates=[i * h, 0, 1, 0])) for i in range(elements + 1)]
+def cables(mbs: Any, elements: int, length: float, EA: float, EI: float, mass: float, start: float = 0.0) -> list[Any]:
+    """Add a straight beam along x, from a start on, of cubic elements without shear; return its nodes."""
+    places = start + np.arange(elements + 1) * length / elements
+    h, nodes = length / elements, [item.NodePoint2DSlope1(referenceCoordinates=[x, 0, 1, 0]) for x in places]
+    nodes = [mbs.AddNode(node) for node in nodes]
     stiffness = {"bendingStiffness": EI, "axialStiffness": EA, "massPerLength": mass}
     for pair in pairwise(nodes):
         mbs.AddObject(
@@ -61,6 +62,61 @@ def spin_up(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
     drive(mbs, nodes[0], (None, None, cosine, sine))
     seconds, (t, _, y, _) = driven(mbs, nodes[-1], steps, tolerance, dense=elements < 12)
     return seconds, np.column_stack([t, y]).tolist()
+
+
+def arm(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂, u₃ of an arm about the axis (0, 0.6, 0.8)."""
+
+    def angle(t: Any, cos: Any, where: Any) -> Any:
+        return where(t < 2.0, t * t * 0.5 + (cos(t * np.pi) - 1.0) * (1 / np.pi**2), (t - 1.0) * 2.0)
+
+    def of(turned: Any) -> Any:
+        return lambda mbs, t, number, offset: turned(angle(t, symbolic.cos, symbolic.IfThenElse))
+
+    mbs, h = exu.SystemContainer().AddSystem(), 8.0 / elements
+    nodes = [
+        mbs.AddNode(item.NodePointSlope1(referenceCoordinates=[i * h, 0, 0, 1, 0, 0])) for i in range(elements + 1)
+    ]
+    for pair in pairwise(nodes):
+        stiffness = {"bendingStiffness": 1.4e4, "axialStiffness": 2.8e7, "massPerLength": 1.2}
+        mbs.AddObject(item.ObjectANCFCable(length=h, nodeNumbers=list(pair), useReducedOrderIntegration=1, **stiffness))
+    slopes = (lambda a: symbolic.cos(a) - 1.0, lambda a: symbolic.sin(a) * 0.8, lambda a: symbolic.sin(a) * -0.6)
+    drive(mbs, nodes[0], (None, None, None, *map(of, slopes)))
+    seconds, t, (x, y, z) = marched(mbs, nodes[-1], steps, tolerance, dense=elements < 8)
+    psi = angle(t, np.cos, np.where)
+    c, s, along = (
+        np.cos(psi),
+        np.sin(psi),
+        0.6 * y + 0.8 * z,
+    )  # back by ψ about the axis e: r c − e×r s + e (e·r)(1 − c)
+    u = (x * c - (0.6 * z - 0.8 * y) * s, y * c - 0.8 * x * s, z * c + 0.6 * x * s)
+    u = (u[0] - 8.0, u[1] + 0.6 * along * (1 - c), u[2] + 0.8 * along * (1 - c))
+    return seconds, np.column_stack([t, *u]).tolist()
+
+
+def hub(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂ of a beam on a free hub under a torque 100 sin 2t."""
+    mbs, radius = exu.SystemContainer().AddSystem(), 0.5
+    nodes = cables(mbs, elements, LENGTH, 2.8e7, 1.4e4, 1.2, radius)
+    turning = mbs.AddNode(item.NodeRigidBody2D(referenceCoordinates=[0, 0, 0]))
+    body = mbs.AddObject(item.ObjectRigidBody2D(mass=1.0, inertia=200.0, nodeNumber=turning))
+    drive(mbs, turning, (None, None))
+    sides = [
+        item.MarkerBodyRigid(bodyNumber=body, localPosition=[radius, 0, 0]),
+        item.MarkerBodyRigid(bodyNumber=0, localPosition=[0, 0, 0]),
+    ]
+    mbs.AddObject(item.GenericJoint(markerNumbers=list(map(mbs.AddMarker, sides)), constrainedAxes=[1, 1, 0, 0, 0, 1]))
+    angle = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=turning, coordinate=2))
+    load = mbs.AddLoad(item.LoadCoordinate(markerNumber=angle, load=1.0))
+    torque = CreateSymbolicUserFunction(mbs, lambda mbs, t, load: symbolic.sin(t * 2) * 100, "loadUserFunction", load)
+    mbs.SetLoadParameter(load, "loadUserFunction", torque)
+    seen = mbs.AddSensor(
+        item.SensorNode(nodeNumber=turning, outputVariableType=exu.OutputVariableType.Coordinates, storeInternal=True)
+    )
+    seconds, t, (x, y, _) = marched(mbs, nodes[-1], steps, tolerance, dense=elements < 12)
+    psi = np.asarray(mbs.GetSensorStoredData(seen))[:, 3]
+    c, s = np.cos(psi), np.sin(psi)
+    return seconds, np.column_stack([t, c * x + s * y - LENGTH - radius, c * y - s * x]).tolist()
 
 
 def spatial(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
@@ -98,19 +154,39 @@ def driven(mbs: Any, tip: Any, steps: int, tolerance: float, dense: bool, hangin
 
     A beam that is hanging begins in its equilibrium at rest, which is not timed.
     """
+    seconds, t, (x, y, z) = marched(mbs, tip, steps, tolerance, dense, END, 0.5, hanging)
+    k = 2 * np.pi / DURATION
+    angle = np.where(
+        t < DURATION, SPEED / DURATION * (t * t / 2 + (np.cos(k * t) - 1) / k**2), SPEED * (t - DURATION / 2)
+    )
+    c, s = np.cos(angle), np.sin(angle)
+    return seconds, (t, c * x + s * y, c * y - s * x, z)
+
+
+def marched(
+    mbs: Any,
+    tip: Any,
+    steps: int,
+    tolerance: float,
+    dense: bool,
+    end: float = 4.0,
+    period: float = 0.1,
+    hanging: bool = False,
+) -> tuple[float, Any, Any]:
+    """March; return seconds of the time loop, instants a period apart, and the position of the tip, (3, instants)."""
     sensor = mbs.AddSensor(
         item.SensorNode(nodeNumber=tip, outputVariableType=exu.OutputVariableType.Position, storeInternal=True)
     )
     mbs.Assemble()
     settings = exu.SimulationSettings()
-    settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, END
+    settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, end
     settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
     settings.timeIntegration.automaticStepSize = False
     newton = settings.timeIntegration.newton
     newton.useModifiedNewton = newton.modifiedNewtonJacUpdatePerStep = True
     newton.relativeTolerance = newton.absoluteTolerance = tolerance
     settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = 0.5
+    settings.solution.sensors.writePeriod = period
     settings.linearSolver.solverType = exu.LinearSolverType.EXUdense if dense else exu.LinearSolverType.EigenSparse
     if hanging:
         still = settings.staticSolver
@@ -120,13 +196,8 @@ def driven(mbs: Any, tip: Any, steps: int, tolerance: float, dense: bool, hangin
     started = process_time()
     mbs.SolveDynamic(settings)
     seconds = process_time() - started
-    t, x, y, z = np.asarray(mbs.GetSensorStoredData(sensor)).T
-    k = 2 * np.pi / DURATION
-    angle = np.where(
-        t < DURATION, SPEED / DURATION * (t * t / 2 + (np.cos(k * t) - 1) / k**2), SPEED * (t - DURATION / 2)
-    )
-    c, s = np.cos(angle), np.sin(angle)
-    return seconds, (t, c * x + s * y, c * y - s * x, z)
+    t, *places = np.asarray(mbs.GetSensorStoredData(sensor)).T
+    return seconds, t, np.array(places)
 
 
 def spinning(mbs: Any, held: Any, turns: tuple[Any, Any], speeds: list[float], count: int) -> list[list[float]]:

@@ -7,6 +7,8 @@ import sys
 from time import process_time
 from typing import Any
 
+import numpy as np
+
 import rotfem
 from rotfem.analysis.march import March, Steps
 from rotfem.commands.problem import Problem, first_shape
@@ -15,7 +17,7 @@ from rotfem.registry import schemes
 
 Values = list[list[float]]
 
-SPIN_UP = {
+SPIN_UP: dict[str, Any] = {
     "structure": {
         "type": "planar_beam",
         "length": 10.0,
@@ -28,6 +30,25 @@ SECTION = {"EA": 2.8e7, "GA2": 1e10, "GA3": 1e10, "GJ": 1e4, "EI2": 1.4e4, "EI3"
 SPATIAL = SPIN_UP | {
     "structure": {"type": "spatial_beam", "length": 10.0, "section": SECTION},
     "loads": {"gravity": [0.0, 0.0, -9.81]},
+}
+#: An arm of 8 m about an inclined axis, and a beam on a free hub; both by a table of rows.
+ROUND = {"EA": 2.8e7, "GA2": 1e7, "GA3": 1e7, "GJ": 1.4e4, "EI2": 1.4e4, "EI3": 1.4e4, "mass_per_length": 1.2}
+RISING = [(t, t - np.sin(np.pi * t) / np.pi if t < 2.0 else 2.0) for t in np.linspace(0.0, 4.0, 301).tolist()]
+ARM = SPIN_UP | {
+    "structure": {
+        "type": "spatial_beam",
+        "length": 8.0,
+        "section": ROUND | {"rotary_inertia2": 6e-4, "rotary_inertia3": 6e-4},
+    },
+    "motion": {"type": "table", "table": [list(map(float, row)) for row in RISING], "axis": [0.0, 0.6, 0.8]},
+}
+HUB = SPIN_UP | {
+    "structure": SPIN_UP["structure"] | {"hub_radius": 0.5},
+    "motion": {
+        "type": "torque",
+        "hub_inertia": 200.0,
+        "table": [[t, float(100 * np.sin(2 * t))] for t in np.linspace(0.0, 4.0, 401).tolist()],
+    },
 }
 THIN = {"EA": 1e6, "GA": 1e6, "EI": 1.0, "mass_per_length": 1.0}
 PLATE = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
@@ -44,17 +65,35 @@ def spatial(elements: int, steps: int, scheme: str, degree: int) -> tuple[float,
     return marched(SPATIAL, elements, steps, scheme, degree, hanging=True)
 
 
+def arm(elements: int, steps: int, scheme: str, degree: int, tolerance: float) -> tuple[float, Values]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂, u₃ of the tip."""
+    return marched(ARM, elements, steps, scheme, degree, end=4.0, tolerance=tolerance)
+
+
+def hub(elements: int, steps: int, scheme: str, degree: int, tolerance: float) -> tuple[float, Values]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂ of the tip."""
+    seconds, rows = marched(HUB, elements, steps, scheme, degree, end=4.0, tolerance=tolerance)
+    return seconds, [row[:3] for row in rows]
+
+
 def marched(
-    scene: dict[str, Any], elements: int, steps: int, scheme: str, degree: int, hanging: bool = False
+    scene: dict[str, Any],
+    elements: int,
+    steps: int,
+    scheme: str,
+    degree: int,
+    hanging: bool = False,
+    end: float = 20.0,
+    tolerance: float = 1e-9,
 ) -> tuple[float, Values]:
     """March; return seconds of the time loop, and rows of t and the displacement of the tip.
 
     A beam that is hanging begins in its equilibrium at rest, which is not timed.
     """
-    tables = {"mesh": {"elements": elements, "degree": degree}, "time": {"end": 20.0, "step": 20.0 / steps}}
+    tables = {"mesh": {"elements": elements, "degree": degree}, "time": {"end": end, "step": end / steps}}
     problem = Problem.of(scene | tables)
     system, start = problem.system(), problem.steady(speed=0.0) if hanging else None
-    march = March(system, schemes[scheme](), Steps(20.0, 20.0 / steps), Newton(), first_shape(system, start))
+    march = March(system, schemes[scheme](), Steps(end, end / steps), Newton(tolerance), first_shape(system, start))
     started = process_time()
     rows = [[state.t, *map(float, system.tip(state.q, state.t)[:3])] for state in march]
     return process_time() - started, rows
