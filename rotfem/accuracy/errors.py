@@ -60,6 +60,9 @@ CORNER = 1.5
 #: Loosest tolerance of adaptive steps.
 LOOSEST = 0.5
 
+#: Elements of a second answer of a beam below which one is longer than half a wave of some modes: of lower order.
+FEW = 3
+
 #: Part of the steps of an answer that a coarser one may take: with more, other things than their error make the steps.
 FEWER = 0.75
 
@@ -276,6 +279,8 @@ def _compare(
     if kinks and own.setting.tolerance is None:
         out.unknown.append("kinks and jumps of what is prescribed leave no longer steps")
         return answer
+    if isinstance(own.output, Spectrum) and isinstance(cells := answer.setting.elements, int) and cells < FEW:
+        other = replace(other, near=other.far)
     halved = answer.setting.degree == own.setting.degree
     before: Distance | None = None
     plate, moving = isinstance(own.setting.elements, tuple), own.setting.moving

@@ -148,7 +148,7 @@ def stations_figure(result: RunResult) -> Figure:
     if len(stations.t) < 2:
         return stacked("x", stations.x, {name: v[-1] for name, v in values.items()}, title)
     figure = stacked("t", stations.t, values, title, below=0.3)
-    lines, said = figure.axes[0].lines, [f"X = {x:g} m" for x in stations.x] if figure.axes else []
+    lines, said = figure.axes[0].lines if figure.axes else [], [f"X = {x:g} m" for x in stations.x]
     figure.legend(lines[:8], said[:8], loc="lower center", ncols=8, fontsize=8, frameon=False)
     return figure
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from rotfem.scene.files import FROM_FILE, existing_file
 from rotfem.scene.structure import DampingTable, StructureTable, check_one_hub
 from rotfem.scene.table import SceneModel, Way, along, choose_way, empty, problem, problems_at, unit
 from rotfem.scene.values import (
+    ROUND_OFF,
     Array,
     NonNegative,
     Number,
@@ -191,10 +191,15 @@ class PlateStructure(StructureTable):
         given = {name: getattr(self, name) for name in ("thickness", *MATERIAL)}
         return {name: value for name, value in given.items() if value is not None and not isinstance(value, float)}
 
-    def at(self, name: str, places: npt.ArrayLike) -> Array:
-        """Return a property that is a table, at places along x, or distances from the origin (m), of their shape."""
+    def at(self, name: str, places: Array, near: Array) -> Array:
+        """Return a property that is a table, at places along x, or distances from the origin (m), of their shape.
+
+        At a step it is that on the side of `near`.
+        """
         value = getattr(self, name)
-        return evaluate(value.table if isinstance(value, Over) else value, places)
+        table = value.table if isinstance(value, Over) else value
+        steps = len({row[0] for row in table}) < len(table)
+        return evaluate(table, places + ROUND_OFF * steps * (near - places))
 
     @property
     def regions(self) -> tuple[str, ...]:

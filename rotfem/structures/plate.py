@@ -93,7 +93,7 @@ def over_place(data: Any, name: str, grid: PlateGrid, rows: Array, degree: int) 
         return f
     if not callable(value) and getattr(value, "over", "x") == "x":
         f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree if len(rows) else 1)), name=name)
-        space, at = f.function_space, lambda x, near: data.at(name, x + ONE * (near - x))
+        space, at = f.function_space, lambda x, near: data.at(name, x, near)
         f.x.array[:] = field_values(at, rows, degree, space, positive).ravel()
         return f
     f = fem.Function(fem.functionspace(grid.mesh, ("DG", degree)), name=name)
@@ -104,7 +104,7 @@ def over_place(data: Any, name: str, grid: PlateGrid, rows: Array, degree: int) 
     else:
         middle = np.empty_like(x)
         middle[cells] = x[cells].mean(axis=1)[:, None]
-        f.x.array[:] = data.at(name, np.linalg.norm(x + ONE * (middle - x), axis=1))
+        f.x.array[:] = data.at(name, np.linalg.norm(x, axis=1), np.linalg.norm(middle, axis=1))
     if len(bad := np.flatnonzero(f.x.array <= 0.0)) and not name.startswith("nu"):
         at = x[bad[0]]
         raise InputError(

@@ -157,11 +157,11 @@ def test_speeds_that_are_finished_are_not_solved_again(unit_beam: Any, tmp_path:
     assert list(until.speeds) == [0.0, 3.0, 6.0]
     assert any(text.startswith("3 of 5 speeds are finished, up to 6 rad/s") for text in until.summary["warnings"])
     other = campbell(beam.replace({"modes.count": 5}), "0:12:5", folder=tmp_path)
-    assert not list(tmp_path.iterdir())
+    assert not (tmp_path / "speeds.npz").exists()
     with pytest.raises(Stopped):
         campbell(beam, "0:12:5", folder=tmp_path, progress=interrupt)
     rest, whole = campbell(beam, "0:12:5", folder=tmp_path), campbell(beam, "0:12:5")
-    assert not list(tmp_path.iterdir())
+    assert not (tmp_path / "speeds.npz").exists()
     assert rest.summary["speeds_solved"] == whole.summary["speeds_solved"] - 3
     assert other.summary["speeds_solved"] >= 5
     np.testing.assert_allclose(rest.frequencies, whole.frequencies, rtol=1e-10)

@@ -165,13 +165,19 @@ def test_a_vibration_out_of_phase_has_all_of_its_difference() -> None:
     assert run.summary["error"]["total"] > 0.5 * true
 
 
-def test_what_knots_make_is_not_taken_for_an_error_of_nothing() -> None:
-    """Rows at every step, at which steps of fourth order end: longer ones are the same, so nothing is known."""
+@pytest.mark.parametrize("jumps", [False, True])
+def test_rows_at_every_step_are_in_the_error(jumps: bool) -> None:
+    """Kinks or jumps at every step of fourth order: the error by steps is not under by 2."""
     t = np.linspace(0.0, 1.0, 51)
-    table = np.column_stack([t, 0 * t, 10.0 * np.cos(40 * t)])
-    run = rotfem.run(scene(0.02, time={"end": 1.0, "scheme": "esdirk4"}, loads={"tip_force": table}))
-    assert run.summary["error"]["total"] is None
-    assert any("no longer steps" in line for line in run.summary["warnings"])
+    t = t.repeat(2)[1:-1] if jumps else t
+    force = 10.0 * (-1.0) ** (np.arange(len(t)) // 2) if jumps else 10.0 * np.cos(40 * t)
+    table = {"tip_force": np.column_stack([t, 0 * t, force])}
+    found, true = (
+        rotfem.run(scene(step, time={"end": 1.0, "scheme": "esdirk4", "output_step": 0.02}, loads=table))
+        for step in (0.02, 0.0005)
+    )
+    error = np.max(np.abs(found.tip["u2"] - true.tip["u2"])) / np.max(np.abs(true.tip["u2"]))
+    assert found.summary["error"]["discretisation"] > 0.5 * error
 
 
 def test_too_few_steps_are_said() -> None:

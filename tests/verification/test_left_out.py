@@ -187,6 +187,7 @@ KNOWN = {
     PlateStructure: {
         *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),
         *("shear_correction", "hub_radius", "hub_offset", "point_masses", "line_masses", "damping"),
+        *("edges", "point_supports"),
     },
 }
 

@@ -65,7 +65,7 @@ def test_a_first_mode_far_below_the_others() -> None:
     assert first["damping"] == pytest.approx(0.05, rel=1e-6)
     free = heavy.replace({"structure.damping": {}, "motion": HUB | {"hub_inertia": 1e12}})
     rows = modes(free).rows
-    assert [row["label"] for row in rows[:2]] == ["rigid body", first["label"]]
+    assert [row["label"] for row in rows[:2]] == ["rigid body", "1st in-plane, a"]
     assert rows[1]["frequency"] == pytest.approx(first["frequency"], rel=3e-3)
 
 

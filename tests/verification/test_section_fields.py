@@ -167,7 +167,7 @@ def test_triangles_of_a_mesh_file_are_refined_to_an_accuracy(tmp_path: Path) -> 
 def test_a_step_of_thickness_within_cells_of_a_mesh_file_is_in_mass_and_error(tmp_path: Path) -> None:
     """Mass and first moment are those of the table. The tip of 40 × 4 cells with a line there moves by 5.7368e-5 m."""
     rows = [[0.0, 0.02], [0.55, 0.02], [0.5501, 0.01], [1.0, 0.01]]
-    case = plate(tmp_path, 8, thickness=rows, tip_force=[0.0, 0.0, 1.0])
+    case = plate(tmp_path, 8, thickness={"over": "x", "table": rows}, tip_force=[0.0, 0.0, 1.0])
     body, x = rotfem.check(case), np.array([r[0] for r in rows])
     h, dx = np.array([r[1] for r in rows]), np.diff(x)
     first = np.sum(dx * (h[:-1] * (2 * x[:-1] + x[1:]) + h[1:] * (x[:-1] + 2 * x[1:])) / 6)
