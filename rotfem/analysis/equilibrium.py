@@ -27,8 +27,9 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import richest
 from rotfem.numerics.eigenproblem import Pencil, RoundOff
-from rotfem.numerics.linear import DirectSolver, negative_count
+from rotfem.numerics.linear import SMALL, DirectSolver, negative_count, symmetric
 from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.projection import sparse_part
 from rotfem.structures.reference_rotation import BeyondReach
 from rotfem.units import speed_text
 
@@ -358,9 +359,14 @@ def balance(
         system.set_time(0.0, system.motion.at_speed(omega), share)
     q = guess.copy()
 
+    solver: DirectSolver | None = None
+
     def correction(before: Array | None) -> Array:
-        b = system.residual()
-        return system.local(DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0]).solve(b))
+        nonlocal solver
+        b, A = system.residual(), system.tangent(1.0, 0.0, 0.0, before)[0]
+        solver = solver or DirectSolver(A, symmetric=sparse_part(A).getSize()[0] > SMALL and symmetric(A))
+        solver.refresh(A)
+        return system.local(solver.solve(b))
 
     increment = limited(system, q, correction)
     if system.linear:
