@@ -73,12 +73,12 @@ CASES: dict[str, dict[str, tuple[str, dict[str, Any]] | str]] = {
         "exudyn": "it does not choose mesh and steps",
     },
     "arm in space to 1e-3": {
-        "rotfem": ("arm", {"elements": 1, "steps": 40, "scheme": "esdirk4", "degree": 3, "tolerance": 1e-7}),
-        "exudyn": ("arm", {"elements": 2, "steps": 400, "tolerance": 1e-6}),
+        "rotfem": ("arm", {"elements": 1, "steps": 40, "scheme": "esdirk4", "degree": 4, "tolerance": 1e-7}),
+        "exudyn": ("arm", {"elements": 6, "steps": 400, "tolerance": 1e-6}),
     },
     "free hub to 1e-3": {
-        "rotfem": ("hub", {"elements": 1, "steps": 40, "scheme": "esdirk4", "degree": 4, "tolerance": 1e-7}),
-        "exudyn": ("hub", {"elements": 4, "steps": 400, "tolerance": 1e-6}),
+        "rotfem": ("hub", {"elements": 3, "steps": 60, "scheme": "esdirk4", "degree": 5, "tolerance": 1e-7}),
+        "exudyn": ("hub", {"elements": 3, "steps": 400, "tolerance": 1e-6}),
     },
     "lag frequencies, 50 speeds": {
         "rotfem": ("lag", {"elements": 4, "speeds": SPEEDS}),
