@@ -528,6 +528,15 @@ class Plate(Structure):
         cantilever = list(self.edges) == ["clamped"] and self.edges["clamped"].kind == "clamped"
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]], self.disk, cantilever)
 
+    def is_rigid(self, coordinates: dict[str, Array], values: Array) -> bool:
+        """Return whether the displacements of a shape are those of a rigid body (see `Structure.is_rigid`)."""
+        places, u = self.places(coordinates), np.zeros((len(values), 3), dtype=complex)
+        u[:, : np.sum(self.moves)] = values[:, self.moves]
+        motions = [np.broadcast_to(e, places.shape) for e in np.eye(3)] + [np.cross(e, places) for e in np.eye(3)]
+        basis = np.stack([motion.ravel() for motion in motions], axis=1)
+        rest = u.ravel() - basis @ np.linalg.lstsq(basis, u.ravel(), rcond=None)[0]
+        return bool(np.max(np.abs(rest)) <= 5e-3 * np.max(np.abs(u)))
+
     def waves(self, coordinates: dict[str, Array], values: Array, axis: Array) -> list[Wave]:
         """Return how modes travel around a disk; empty of other plates."""
         return [] if self.disk is None else [self.disk.wave(w, axis[2]) for w in values[..., 2]]
