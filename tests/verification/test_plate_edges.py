@@ -60,6 +60,16 @@ def test_squares(name: str) -> None:
     np.testing.assert_allclose(frequencies(scene, len(expected)), expected, rtol=1.2e-3)
 
 
+@pytest.mark.parametrize(
+    ("thickness", "expected"), [(0.001, [13.468, 19.596, 24.270]), (0.1, [12.7189, 18.9434, 23.3245])]
+)
+def test_a_plate_that_nothing_holds_has_six_rigid_motions(thickness: float, expected: list[float]) -> None:
+    scene = {**plate(thickness, around("free")), "mesh": {"elements": [6, 6], "degree": 3}}
+    found = rotfem.modes({**scene, "modes": {"count": 9}})
+    assert [label.partition(",")[0] for label in found.labels[:6]] == ["rigid body"] * 6
+    np.testing.assert_allclose(frequencies(scene, 9)[6:], expected, rtol=1e-3)
+
+
 def test_a_quarter_with_two_planes_of_symmetry_is_the_whole() -> None:
     quarter = {"clamped": "symmetric", "lower": "symmetric", "tip": HARD, "upper": HARD}
     expected = [2 * PI2, 10 * PI2, 10 * PI2, 18 * PI2]
