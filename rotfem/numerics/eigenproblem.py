@@ -409,9 +409,9 @@ class Pencil:
         if float(np.max(errors)) > 1e-10 and not 0.25 <= unit / (self.unit or unit) <= 4.0:
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
-        sizes = np.abs(values)  # of several motions that nothing holds the median would be that of zeros
-        moving = sizes[sizes > ZERO_EIGENVALUE * np.max(sizes)]
-        self._smallest = float(np.median(moving)) if len(moving) else 0.0
+        sizes = np.abs(values)
+        moving = sizes[sizes > ZERO_EIGENVALUE * np.max(sizes)]  # but for several motions that nothing holds
+        self._smallest = float(np.median(moving if 0 < len(moving) < len(sizes) - 2 else sizes))
         small = ZERO_EIGENVALUE * self._smallest if target > 0.0 else 0.0
         if self.damped and heavily_damped(values[self.stiff(right) & (np.abs(values) > small)]):
             return self._damped(count, target)
