@@ -90,10 +90,12 @@ class Surface:
 
     def displaced(self, columns: Mapping[str, Array]) -> Array:
         """Return the displacements (k, 3), m, of the points by components at the nodes: u1, … (m), theta1, … (rad)."""
-        from scipy.spatial.transform import Rotation  # slow to load
-
         u, turns = self._at_points(columns)
-        return np.asarray(u + Rotation.from_rotvec(turns).apply(self.arms) - self.arms)
+        angle = np.linalg.norm(turns, axis=1, keepdims=True)
+        e = turns / np.where(angle > 0.0, angle, 1.0)  # Rodrigues' formula; scipy's takes 0.15 s to load
+        return np.asarray(
+            u + np.sin(angle) * np.cross(e, self.arms) + (1 - np.cos(angle)) * np.cross(e, np.cross(e, self.arms))
+        )
 
     def _at_points(self, columns: Mapping[str, Array]) -> tuple[Array, Array]:
         """Return displacements and rotations (k, 3) of what carries the points."""
