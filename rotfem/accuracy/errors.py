@@ -8,7 +8,7 @@ with r the ratio of their steps or cells and p the order (Richardson's extrapola
 section II.4).
 
 - Of steps p is 2: higher orders are reduced by stiff components (Hairer & Wanner 1996, section IV.15). Vibrations that
-  are out of phase in one of the answers have no order. They may be small beside the motion, but hardly so in its
+  are out of phase in one of the answers have no order. They may be small compared with the motion, but hardly so in its
   acceleration: where d or the same of second differences is above `ASYMPTOTIC`, d is not divided.
 - Of elements of degree k of a beam, which end where its sections jump, p is 2k − 2: displacements at nodes and
   eigenvalues have 2k (Strang & Fix 1973, sections 1.6 and 6.3), two less where it is so thin that elements lock

@@ -239,7 +239,7 @@ def constant_stability(system: System, newton: Newton) -> Stability | None:
 # --- the speed at which a linear theory loses its stiffness -----------------------------------------------------------
 
 
-#: Least part of an upper bound of Omega² that is looked at, the ratio to which it is enclosed before it is computed,
+#: Least part of an upper bound of Omega² that is tried, the ratio to which it is enclosed before it is computed,
 #: and the one to which it is enclosed where eigenvalues are too close to each other.
 LEAST, NEAR, NEAREST = 1e-24, 2.0, 1.0 + 1e-9
 
